@@ -17,10 +17,11 @@ COMMANDS = {
     "groundray-golden": ["run", "accept", "compare", "passes", "conform"],
     "groundray-view": [],
     "groundray-export": [],
+    "groundray-cluster": ["run", "sweep", "shard", "merge", "status", "verify"],
 }
 OTHERS = {"--array", "--cuda", "--hip", "--opencl"}  # Slurm's, and those of ./dev bench device
 # A command, up to where a shell or a sentence would end it.
-CALL = re.compile(r"(?<![\w/.-])(groundray(?:-golden|-view|-export)?)(?= )([^|;&`#\n]*)")
+CALL = re.compile(r"(?<![\w/.-])(groundray(?:-golden|-view|-export|-cluster)?)(?= )([^|;&`#\n]*)")
 
 
 @functools.cache

@@ -10,6 +10,7 @@ import threading
 from pathlib import Path
 
 import pytest
+import yaml
 from cluster_runs import (
     PACKAGE,
     SHARDS,
@@ -22,7 +23,7 @@ from cluster_runs import (
     single_run,
     wait_for,
 )
-from dataset_runs import files
+from dataset_runs import ROOT, files
 
 
 def test_a_dask_cluster_that_loses_a_worker_gives_the_bytes_of_a_single_run(tmp_path):
@@ -111,3 +112,24 @@ def test_refusals_of_sbatch_and_its_absence_are_reported(tmp_path, sbatch, capsy
     if shutil.which("sbatch") is None:
         assert cluster(*given) == 1
         assert "sbatch: No such file or directory; SLURM is not on" in capsys.readouterr().err
+
+
+def test_the_manifest_of_the_page_fits_the_schema_of_kubernetes():
+    schemas = pytest.importorskip("kubernetes_validate")
+    page = (ROOT / "docs/reference/cluster.md").read_text()
+    (block,) = (each for each in re.findall(r"```yaml\n(.*?)```", page, re.S) if "kind:" in each)
+    manifest = yaml.safe_load(block)
+    schemas.validate(manifest, "1.33", strict=True)
+    with pytest.raises(schemas.ValidationError):
+        schemas.validate({**manifest, "spec": {"completions": "all"}}, "1.33", strict=True)
+    (container,) = manifest["spec"]["template"]["spec"]["containers"]
+    (text,) = container["args"]
+    last = manifest["spec"]["completions"] - 1
+    words = subprocess.run(
+        ["sh", "-c", text.replace("exec groundray-cluster", "printf '%s\\n'")],
+        env={"JOB_COMPLETION_INDEX": str(last), "PATH": "/usr/bin:/bin"},
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout.split()
+    assert words[words.index("--shard") + 1] == f"{last + 1}/{last + 1}"

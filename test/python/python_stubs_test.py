@@ -74,10 +74,11 @@ groundray.simplify("mesh.ply")
 
 
 def test_the_package_passes_mypy(tmp_path):
-    """Covers its Python files, including groundray-export."""
+    """Covers its Python files, including groundray-export and groundray-cluster."""
     foreign = (
         "OpenEXR",
         "cv2",
+        "distributed",
         "laspy",
         "lazrs",
         "mcap",

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import os
-import shutil
 import signal
 import sys
 import tempfile
@@ -135,7 +134,8 @@ def _task(options: argparse.Namespace, scene: Path, store: str, shards: int) -> 
     threads = options.threads
     if threads is None and getattr(options, "executor", "") == "local":
         threads = max(1, (os.cpu_count() or 1) // (options.workers or 1))
-    program = shutil.which(options.groundray) or options.groundray
+    program = options.groundray  # a name is looked up by each machine
+    program = str(Path(program).absolute()) if "/" in program else program
     scratch = str(options.scratch.absolute())
     place = str(scene.absolute())
     return Task(place, shards, Store(store).url, options.seed, program, scratch, threads)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import logging
 import shlex
 import subprocess
 import sys
@@ -73,6 +74,8 @@ def run_dask(address: str, jobs: Sequence[Job], retries: int) -> Iterator[Outcom
     if importlib.util.find_spec("distributed") is None:
         raise Error("Dask is not installed: pip install 'dask[distributed]'")
     dask: Any = importlib.import_module("distributed")
+    for name in ("distributed", "distributed.client"):
+        logging.getLogger(name).setLevel(logging.CRITICAL)  # faults are told here, in one line
     try:
         client = dask.Client(address, timeout=20)
     except (OSError, ValueError) as fault:
