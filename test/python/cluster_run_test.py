@@ -1,15 +1,19 @@
 """groundray-cluster with a store in a folder: equal bytes, after kills and repetitions."""
 
+import importlib.util
 import os
 import re
 import shutil
 import signal
+import subprocess
+import sys
 import threading
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
 from cluster_runs import (
+    PACKAGE,
     PROGRAM,
     SHARDS,
     arguments,
@@ -277,7 +281,7 @@ def test_merge_names_shards_that_are_missing_or_damaged(store, capsys):
     assert "shards/1.done: changed since it was written" in capsys.readouterr().err
     (store / "shards/1.done").write_bytes((store / "shards/2.done").read_bytes())
     assert cluster("merge", url) == 1
-    assert "shards/1.done: it is of another run: " in capsys.readouterr().err
+    assert "shards/1.done: it is the marker of another shard" in capsys.readouterr().err
     (store / "shards/1.done").unlink()
     assert cluster("merge", url) == 1
     assert "1 of 6 shards are not done, such as 1; " in capsys.readouterr().err
@@ -309,6 +313,51 @@ def test_status_counts_shards_and_shows_the_end_of_logs(store, tmp_path, capsys)
     assert told.endswith(
         ": 3 of 6 shards done, 1 running, 1 failed, 1 waiting; 60 shards/h, 3.0 min left\n"
     )
+
+
+def test_a_full_disk_is_reported_and_leaves_nothing(tmp_path, scratch):
+    """In a file system of 600 KiB, which only processes of this command see."""
+    mount = f"mount -t tmpfs -o size=600k none {scratch}"
+    if subprocess.run(["unshare", "-rm", "sh", "-c", mount], check=False).returncode != 0:
+        pytest.skip("this machine does not let users mount file systems")
+    store = tmp_path / "store"
+    given = arguments(single_run()[0], store.as_uri(), "--retries", 0, "--scratch", scratch)
+    run = subprocess.run(
+        [
+            *("unshare", "-rm", "sh", "-c"),
+            *(f'{mount} && "$@"; code=$?; ls {scratch}; exit $code', "sh"),
+            *(sys.executable, "-P", "-m", "groundray.cluster", *given),
+        ],
+        env={**os.environ, "PYTHONPATH": str(PACKAGE)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert run.returncode == 1
+    *_, line = run.stderr.splitlines()
+    assert "No space left on device" in line
+    assert run.stdout == ""  # nothing is left in scratch
+    assert not list(store.glob("dataset/*/*/*"))
+
+
+@pytest.mark.parametrize(
+    ("module", "given", "message"),
+    [
+        ("obstore", [], "stores need obstore, which is not installed: pip install obstore"),
+        (
+            "distributed",
+            ["--executor", "dask://127.0.0.1:1"],
+            "Dask is not installed: pip install 'dask[distributed]'",
+        ),
+    ],
+)
+def test_missing_packages_are_named(tmp_path, capsys, monkeypatch, module, given, message):
+    found = importlib.util.find_spec
+    monkeypatch.setattr(
+        importlib.util, "find_spec", lambda name: None if name == module else found(name)
+    )
+    assert cluster(*arguments(single_run()[0], (tmp_path / "s").as_uri()), *given) == 1
+    assert capsys.readouterr().err == f"groundray-cluster: {message}\n"
 
 
 def test_a_fault_of_the_scene_is_reported_once_and_ends_the_run(tmp_path, capsys):

@@ -45,19 +45,19 @@ def _parser() -> argparse.ArgumentParser:
         return commands.add_parser(name, help=text, description=text, allow_abbrev=False)
 
     run = command("run", "Make all shards of a scene that the store does not have, and merge them.")
-    run.add_argument("scene", metavar="SCENE", type=Path, help="scene file")
+    _add_scene(run)
     run.add_argument("--shards", type=_positive, required=True, metavar="N", help="number of parts")
-    _add_run(run)
     _add_executor(run)
     sweep = command("sweep", "Run a scene over a table of parameters, one dataset each.")
     sweep.add_argument("params", metavar="PARAMS.yaml", type=Path, help="table of parameters")
-    _add_run(sweep)
+    sweep.set_defaults(seed=None)
     _add_executor(sweep)
     shard = command("shard", "Make one shard, as a task of a job array does.")
-    shard.add_argument("scene", metavar="SCENE", type=Path, help="scene file")
+    _add_scene(shard)
     text = "number of the shard, from 1, and number of all"
     shard.add_argument("--shard", type=_shard, required=True, metavar="I/N", help=text)
-    _add_run(shard)
+    for each in (run, sweep, shard):
+        _add_attempts(each)
     for name, text in (
         ("merge", "Write dataset.yaml of a run whose shards are done."),
         ("status", "Show how far a run is, its rate, and the logs of failed shards."),
@@ -67,14 +67,14 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _add_run(parser: argparse.ArgumentParser) -> None:
+def _add_scene(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("scene", metavar="SCENE", type=Path, help="scene file")
+    parser.add_argument("--seed", type=_whole, metavar="S", help="seed instead of the scene's")
+
+
+def _add_attempts(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("--store", required=True, metavar="URL", help="s3://BUCKET/PREFIX or file:///FOLDER")
-    text = "seed instead of the scene's"
-    if parser.prog.endswith("sweep"):
-        parser.set_defaults(seed=None)
-    else:
-        add("--seed", type=_whole, metavar="S", help=text)
     text = "more attempts at a shard that fails (default: 2)"
     add("--retries", type=_whole, default=2, metavar="R", help=text)
     text = "folder for the files of shards under way (default: that of temporary files)"
@@ -92,7 +92,7 @@ def _add_executor(parser: argparse.ArgumentParser) -> None:
     add("--workers", type=_positive, metavar="W", help=text)
     text = "option of sbatch, such as --sbatch=--partition=long; may be repeated"
     add("--sbatch", action="append", metavar="OPTION", help=text)
-    text = "print the scripts for SLURM, and do nothing"
+    text = "print the scripts for SLURM, but submit nothing"
     add("--print-script", action="store_true", help=text)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import re
 from collections.abc import Iterable, Iterator
+from itertools import zip_longest
 from typing import NamedTuple
 
 from groundray.cluster.store import Sum
@@ -119,12 +120,10 @@ class Listing:
 
 
 def difference(text: str, other: str) -> str:
-    """Returns the first line that differs between two texts."""
-    lines, others = text.splitlines(), other.splitlines()
-    count = max(len(lines), len(others))
-    lines += [""] * (count - len(lines))
-    others += [""] * (count - len(others))
-    line, second = next(((a, b) for a, b in zip(lines, others, strict=True) if a != b), ("", ""))
-    at = next((i for i, (a, b) in enumerate(zip(line, second, strict=False)) if a != b), 0)
-    begin = 0 if at < 40 else at - 40
-    return f"'{line[begin : begin + 80]}' instead of '{second[begin : begin + 80]}'"
+    """Returns the first line that differs between two texts, from shortly before the difference."""
+    pairs = zip_longest(text.splitlines(), other.splitlines(), fillvalue="")
+    lines = next((pair for pair in pairs if pair[0] != pair[1]), ("", ""))
+    same = next((i for i, (a, b) in enumerate(zip(*lines, strict=False)) if a != b), 0)
+    begin = max(0, same - 40)
+    line, second = (each[begin : begin + 80] for each in lines)
+    return f"'{line}' instead of '{second}'"

@@ -9,11 +9,12 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime
 from itertools import islice
+from typing import IO
 
 from groundray.cluster.identity import COMMON, DATASET, RECORD, SCENE, log_of, marker_of, recorded
 from groundray.cluster.listing import Listed, Listing, closed, difference
 from groundray.cluster.shard import ATTEMPT, HEARTBEAT_S
-from groundray.cluster.store import FinalError, Object, Store, Sum
+from groundray.cluster.store import Object, Store, Sum
 from groundray.dataset import Error
 
 Tell = Callable[[str], None]
@@ -42,56 +43,50 @@ def merge(store: Store) -> str:
             f"{missing[0]}; run the same command again, or see groundray-cluster status"
         )
     common = (store.get(COMMON) or b"").decode()
-    header, files = "", [""]
-    places: array[int] = array("q")
     with tempfile.TemporaryFile() as entries, tempfile.TemporaryFile() as text:
-        for shard in range(1, run.shards + 1):
-            key = marker_of(shard)
-            listing = Listing(f"{store.url}/{key}", store.lines(key))
-            header = header or listing.header
-            places = places or array("q", [-1]) * listing.total
-            if listing.header != header or listing.shard != f'shard: "{shard}/{run.shards}"\n':
-                raise FinalError(
-                    f"{listing.name}: it is of another run: {difference(listing.header, header)}"
-                )
-            for line in listing.frames():
-                place = listing.place(line)
-                if places[place] >= 0:
-                    raise FinalError(
-                        f"{listing.name}: another shard has this frame too: {line[:60]}"
-                    )
-                places[place] = entries.tell()
-                entries.write(line.encode())
-            if listing.common() != common:
-                raise FinalError(
-                    f"{listing.name}: it differs from {COMMON}: "
-                    f"{difference(listing.common(), common)}"
-                )
-            files = listing.files
-        if -1 in places:
-            raise FinalError(f"{store.url}: no shard has frame {places.index(-1)} of {len(places)}")
+        places = _gather(store, run.shards, common, entries)
 
         def lines() -> Iterator[str]:
-            yield header + "frames:\n"
+            header, mark, files = common.partition("\nfiles:\n")
+            yield f"{header}\nframes:\n"
             for place in places:
                 entries.seek(place)
                 yield entries.readline().decode()
-            yield from files
+            yield mark[1:] + files
 
         digest = hashlib.sha256()
         for each in closed(lines()):
             digest.update(each)
             text.write(each)
-        whole = Sum(text.tell(), digest.hexdigest())
         there = store.sum_of(DATASET)
         if there is None:
             text.seek(0)
             store.put(DATASET, text)
-        elif there != whole:
-            raise FinalError(
-                f"{store.url}/{DATASET}: it is another dataset's; choose another store"
-            )
+        elif there != Sum(text.tell(), digest.hexdigest()):
+            raise Error(f"{store.url}/{DATASET}: it is another dataset's; choose another store")
     return f"{len(places)} frames of {run.shards} shards"
+
+
+def _gather(store: Store, shards: int, common: str, entries: IO[bytes]) -> array[int]:
+    """Writes the lines of all frames; returns where each is, in the order of the dataset."""
+    places: array[int] = array("q")
+    for shard in range(1, shards + 1):
+        listing = Listing(f"{store.url}/{marker_of(shard)}", store.lines(marker_of(shard)))
+        places = places or array("q", [-1]) * listing.total
+        if listing.shard != f'shard: "{shard}/{shards}"\n' or len(places) != listing.total:
+            raise Error(f"{listing.name}: it is the marker of another shard")
+        for line in listing.frames():
+            place = listing.place(line)
+            if places[place] >= 0:
+                raise Error(f"{listing.name}: another shard has this frame too: {line[:60]}")
+            places[place] = entries.tell()
+            entries.write(line.encode())
+        if listing.common() != common:
+            how = difference(listing.common(), common)
+            raise Error(f"{listing.name}: it is of another run than {COMMON}: {how}")
+    if -1 in places:
+        raise Error(f"{store.url}: no shard has frame {places.index(-1)} of {len(places)}")
+    return places
 
 
 def verify(store: Store, tell: Tell) -> tuple[int, str]:
