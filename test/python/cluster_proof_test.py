@@ -10,7 +10,6 @@ import signal
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import pytest
 from cluster_runs import PACKAGE, arguments, cluster, started
@@ -78,18 +77,9 @@ class Dask:
 
     def workers(self):
         """Returns the processes that make shards: each is the child of a process that guards it."""
-        found = []
-        for guard in self.guards:
-            try:
-                children = Path(f"/proc/{guard.pid}/task/{guard.pid}/children").read_text()
-                found += [
-                    int(child)
-                    for child in children.split()
-                    if "spawn_main" in Path(f"/proc/{child}/cmdline").read_text()
-                ]
-            except OSError:
-                continue
-        return found
+        guards = ",".join(str(guard.pid) for guard in self.guards)
+        call = ["pgrep", "-P", guards, "-f", "spawn_main"]
+        return subprocess.run(call, capture_output=True, text=True, check=False).stdout.split()
 
     def stop(self):
         for process in (*self.guards, self.scheduler):
@@ -131,7 +121,7 @@ def test_kills_restarts_failures_and_doubled_attempts_change_no_byte(
                     assert "lost the scheduler; run the same command again" in run.stderr.read()
                     run, runs = started(*on_dask), runs + 1
                 if killed < KILLS and (workers := dask.workers()):
-                    os.kill(chance.choice(workers), signal.SIGKILL)
+                    os.kill(int(chance.choice(workers)), signal.SIGKILL)
                     killed += 1
                 if runs == 1 and done() > SHARDS // 2:
                     dask.restart()

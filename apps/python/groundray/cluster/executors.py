@@ -85,10 +85,12 @@ def run_dask(address: str, jobs: Sequence[Job], retries: int) -> Iterator[Outcom
         try:
             for future in dask.as_completed(futures):
                 job, error = futures[future], future.exception()
-                if future.status == "cancelled":
-                    raise Error(f"{address}: lost the scheduler; run the same command again")
+                if future.cancelled():
+                    raise ConnectionError
                 state, message = ("failed", str(error)) if error else future.result()
                 yield Outcome(job, state, message)
+        except OSError:  # so are Dask's own
+            raise Error(f"{address}: lost the scheduler; run the same command again") from None
         finally:
             client.cancel(list(futures))
 
