@@ -12,7 +12,13 @@ import pytest
 from dataset_runs import ROOT
 
 BIN = ROOT / "build/release/bin"
-PROGRAMS = ["groundray", "groundray-golden", "groundray-view", "groundray-export"]
+PROGRAMS = [
+    "groundray",
+    "groundray-golden",
+    "groundray-view",
+    "groundray-export",
+    "groundray-cluster",
+]
 COMMANDS = {
     "groundray": [
         *("generate", "verify", "merge", "info", "list", "terrain", "reconstruct"),
@@ -20,6 +26,7 @@ COMMANDS = {
         *(f"reconstruct {what}" for what in ("mesh", "simplify", "fill", "dem")),
     ],
     "groundray-golden": ["run", "accept", "compare", "passes", "conform"],
+    "groundray-cluster": ["run", "sweep", "shard", "merge", "status", "verify"],
 }
 
 
@@ -90,6 +97,13 @@ printf '%s\\n' "${{COMPREPLY[@]}}"
         ("groundray-export --la", {"--labels"}),
         ("groundray-export sc", {"scene.yaml"}),
         ("groundray-export --columns ", set()),
+        ("groundray-cluster s", {"sweep", "shard", "status"}),
+        ("groundray-cluster --completion z", {"zsh"}),
+        ("groundray-cluster run --sh", {"--shards"}),
+        ("groundray-cluster run sc", {"scene.yaml"}),
+        ("groundray-cluster run --scratch ", {"scene.yaml"}),
+        ("groundray-cluster run --retries ", set()),
+        ("groundray-cluster status ", set()),
     ],
 )
 def test_bash_completes(tmp_path, line, words):
@@ -152,6 +166,8 @@ def shown_by_zsh(folder, line, words):
         ("groundray-golden compare --png ", ["kitti_depth", "label"]),
         ("groundray-view --c", ["--colour-by", "--compare-with", "--completion"]),
         ("groundray-export --to ", ["kitti", "semantic-kitti", "mcap"]),
+        ("groundray-cluster s", ["sweep", "shard", "status", "Show how far a run is"]),
+        ("groundray-cluster run --s", ["--shards", "--seed", "--store", "--scratch"]),
     ],
 )
 def test_zsh_completes(tmp_path, line, words):

@@ -340,6 +340,16 @@ def test_a_full_disk_is_reported_and_leaves_nothing(tmp_path, scratch):
     assert not list(store.glob("dataset/*/*/*"))
 
 
+@pytest.mark.parametrize("command", ["merge", "status", "verify"])
+def test_a_folder_that_does_not_exist_is_reported_and_not_made(tmp_path, capsys, command):
+    url = (tmp_path / "no store").as_uri()
+    assert cluster(command, url) == 1
+    assert capsys.readouterr().err == (
+        f"groundray-cluster: {url}: there is no such folder; correct the store\n"
+    )
+    assert list(tmp_path.iterdir()) == []
+
+
 @pytest.mark.parametrize(
     ("module", "given", "message"),
     [
@@ -377,6 +387,7 @@ def test_a_fault_of_the_scene_is_reported_once_and_ends_the_run(tmp_path, capsys
         (("--scratch", "/nowhere"), "/nowhere: No such file or directory; choose another folder"),
         (("--groundray", "no-groundray"), "no-groundray: .*; name the program by --groundray"),
         (("--store", "ftp://host/x"), "ftp://host/x: a store is s3://BUCKET/PREFIX or file:///"),
+        (("--store", "file:///dev/null/x"), "file:///dev/null/x: Not a directory"),
         (("--executor", "dask://127.0.0.1:1"), "127.0.0.1:1: no scheduler answers"),
     ],
 )

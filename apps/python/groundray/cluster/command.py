@@ -25,6 +25,7 @@ from groundray.cluster.identity import SCENE, Task
 from groundray.cluster.store import Store
 from groundray.cluster.sweep import read_sweep, write_scene
 from groundray.dataset import Error
+from groundray.shell_text import add_text_options
 
 DONE, FAILED, INTERRUPTED = 0, 1, 130  # argparse exits with 2 on wrong usage
 
@@ -39,6 +40,7 @@ def _parser() -> argparse.ArgumentParser:
         "0 done, 1 failed, 2 wrong usage, 130 interrupted. The same command continues a run.",
         allow_abbrev=False,
     )
+    add_text_options(parser)
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
 
     def command(name: str, text: str) -> argparse.ArgumentParser:
@@ -138,7 +140,7 @@ def _task(options: argparse.Namespace, scene: Path, store: str, shards: int) -> 
     program = str(Path(program).absolute()) if "/" in program else program
     scratch = str(options.scratch.absolute())
     place = str(scene.absolute())
-    return Task(place, shards, Store(store).url, options.seed, program, scratch, threads)
+    return Task(place, shards, Store.begin(store).url, options.seed, program, scratch, threads)
 
 
 def _outcomes(options: argparse.Namespace, jobs: Sequence[Job]) -> Iterator[Outcome]:

@@ -39,7 +39,7 @@ def make_shard(task: Task, shard: int, stop: threading.Event | None = None) -> s
 
     Raises Error, FinalError if another attempt would fail likewise, KeyboardInterrupt after `stop`.
     """
-    store = Store(task.store)
+    store = Store.begin(task.store)
     task.identity().claim(store)
     if store.has(marker_of(shard)):
         return "there"

@@ -10,20 +10,25 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from datetime import datetime, timedelta
+from pathlib import Path
 from typing import IO, Any, NamedTuple
+from urllib.parse import urlsplit
+from urllib.request import url2pathname
 
 from groundray.dataset import Error
 
+_PATIENCE_S = 90.0
 _RETRIES: Any = {  # of requests that fail by 5xx, a timeout or a lost connection
-    "max_retries": 8,
-    "retry_timeout": timedelta(seconds=90),
+    "max_retries": 1000,
+    "retry_timeout": timedelta(seconds=_PATIENCE_S),
     "backoff": {
         "init_backoff": timedelta(milliseconds=200),
         "max_backoff": timedelta(seconds=10),
         "base": 2,
     },
 }
-_WAITS_S = (1.0, 5.0)  # before a file is sent again, which the client alone does not repeat
+# What the server rejects, or a missing bucket: in vain to repeat.
+_REJECTED = re.compile(r"NoSuchBucket|status code: [34]\d\d")
 
 
 class FinalError(Error):
@@ -52,6 +57,16 @@ def sum_of(data: bytes) -> Sum:
 class Store:
     """Objects below a URL. Any number of threads may use it."""
 
+    @classmethod
+    def begin(cls, url: str) -> Store:
+        """Opens a store to write to: a folder is made if there is none."""
+        try:
+            if folder := _folder(url):
+                folder.mkdir(parents=True, exist_ok=True)
+        except OSError as fault:
+            raise Error(f"{url}: {fault.strerror}") from None
+        return cls(url)
+
     def __init__(self, url: str) -> None:
         self.url = url.rstrip("/")
         if not re.fullmatch(r"s3://[\w.-]+(/.+)?|file:///.+", self.url):
@@ -60,9 +75,12 @@ class Store:
             raise FinalError("stores need obstore, which is not installed: pip install obstore")
         from obstore.store import from_url
 
+        folder = _folder(self.url)
+        if folder and not folder.is_dir():
+            raise FinalError(f"{self.url}: there is no such folder; correct the store")
         with self._told():
-            if self.url.startswith("file:"):
-                self._store: Any = from_url(self.url, mkdir=True)
+            if folder:
+                self._store: Any = from_url(self.url)
             else:
                 is_plain = os.environ.get("AWS_ENDPOINT_URL", "").startswith("http://")
                 options: Any = {"allow_http": is_plain, "timeout": "120s"}
@@ -82,11 +100,15 @@ class Store:
             raise Error(f"{self.url}: {_why(fault, text)}") from None
 
     def create(self, key: str, data: bytes) -> bool:
-        """Writes an object unless there is one; returns false if there is."""
+        """Writes an object unless there is one; returns false if there is.
+
+        Repeats it after a timeout or a lost connection, after which the client alone does not.
+        """
         import obstore
         from obstore.exceptions import AlreadyExistsError, GenericError
 
-        for wait_s in (*_WAITS_S, None):
+        begin_s = time.monotonic()
+        while True:
             with self._told():
                 try:
                     obstore.put(self._store, key, data, mode="create")
@@ -94,10 +116,10 @@ class Store:
                 except AlreadyExistsError:
                     return False
                 except GenericError as fault:
-                    if wait_s is None or "NoSuchBucket" in str(fault):
+                    is_over = time.monotonic() - begin_s > _PATIENCE_S
+                    if is_over or _REJECTED.search(str(fault)):
                         raise
-                    time.sleep(wait_s)
-        raise AssertionError
+                    time.sleep(1)
 
     def put_once(self, key: str, data: bytes) -> None:
         """Writes an object, or finds it there with the same bytes.
@@ -171,6 +193,11 @@ class Store:
             for batch in obstore.list(self._store, prefix):
                 for each in batch:
                     yield Object(each["path"], each["last_modified"])
+
+
+def _folder(url: str) -> Path | None:
+    """Returns the folder of a URL of a file."""
+    return Path(url2pathname(urlsplit(url).path)) if url.startswith("file:///") else None
 
 
 def _why(fault: Exception, text: str) -> str:

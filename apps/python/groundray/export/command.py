@@ -19,7 +19,7 @@ from groundray.export import clouds, denoised, kitti, las, ros_bag, tum
 from groundray.export.labels import LabelMap
 from groundray.export.notes import Notes, tell_of_columns, tell_of_products
 from groundray.export.scan import FullScale
-from groundray.export.shell_text import add_text_options
+from groundray.shell_text import add_text_options
 
 DONE, FAILED, INTERRUPTED = 0, 1, 130  # argparse exits with 2 on wrong usage
 

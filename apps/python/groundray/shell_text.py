@@ -12,15 +12,19 @@ _BASH = """\
 # bash completion of {program}, printed by `{program} --completion bash`
 {function}() {{
   local current=${{COMP_WORDS[COMP_CWORD]}} previous=${{COMP_WORDS[COMP_CWORD - 1]}}
-  local words='' files=''
+  local command='' options='' words='' files=''
   if [[ $current == '=' ]]; then
     current=''
   elif [[ $previous == '=' ]]; then
     previous=${{COMP_WORDS[COMP_CWORD - 2]}}
   fi
-  COMPREPLY=()
-  case $previous in
-{values}    *) if [[ $current == -* ]]; then words='{options}'; else files=1; fi ;;
+{commands}  COMPREPLY=()
+  case "$command $previous" in
+{values}    *)
+      case $command in
+{options}      esac
+      if [[ $current == -* ]]; then words=$options files=''; fi
+      ;;
   esac
   mapfile -t COMPREPLY < <(compgen -W "$words" -- "$current")
   if [[ -n $files ]]; then
@@ -29,6 +33,26 @@ _BASH = """\
   fi
 }}
 complete -F {function} {program}
+"""
+_BASH_COMMANDS = """\
+  if ((COMP_CWORD > 1)); then
+    case ${{COMP_WORDS[1]}} in
+      {names}) command=${{COMP_WORDS[1]}} ;;
+    esac
+  fi
+"""
+_ZSH_COMMANDS = """\
+  local context state line
+  local -a commands=(
+{texts}
+  )
+{arguments} \\
+    '1:command:{{_describe command commands}}' \\
+    '*::argument:->arguments'
+  [[ $state == arguments ]] || return
+  case $line[1] in
+{calls}
+  esac
 """
 
 
@@ -49,7 +73,18 @@ def _options(parser: argparse.ArgumentParser) -> list[argparse.Action]:
 
 
 def _arguments(parser: argparse.ArgumentParser) -> list[argparse.Action]:
-    return [action for action in parser._actions if not action.option_strings]
+    return [
+        action
+        for action in parser._actions
+        if not action.option_strings and not isinstance(action, argparse._SubParsersAction)
+    ]
+
+
+def _commands(parser: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser]:
+    """Returns the commands of a program by their names; none if it has none."""
+    return next(
+        (dict(a.choices) for a in parser._actions if isinstance(a, argparse._SubParsersAction)), {}
+    )
 
 
 def _function(parser: argparse.ArgumentParser) -> str:
@@ -58,17 +93,26 @@ def _function(parser: argparse.ArgumentParser) -> str:
 
 def bash_completion(parser: argparse.ArgumentParser) -> str:
     """Returns a script that completes command lines in bash."""
-    values = ""
-    for action in _options(parser):
-        if not _has_value(action):
-            continue
-        value = "files=1" if action.type is Path else "words=''"
-        if action.choices:
-            value = f"words='{' '.join(map(str, action.choices))}'"
-        values += f"    {'|'.join(action.option_strings)}) {value} ;;\n"
-    names = [name for action in _options(parser) for name in action.option_strings]
+    commands = _commands(parser)
+    values = options = ""
+    for name, each in {"": parser, **commands}.items():
+        for action in filter(_has_value, _options(each)):
+            value = "files=1" if action.type is Path else "words=''"
+            if action.choices:
+                value = f"words='{' '.join(map(str, action.choices))}'"
+            places = "|".join(f"'{name} {option}'" for option in action.option_strings)
+            values += f"    {places}) {value} ;;\n"
+        names = [option for action in _options(each) for option in action.option_strings]
+        first = "files=1" if any(action.type is Path for action in _arguments(each)) else "words=''"
+        if commands and not name:
+            first = f"words='{' '.join(commands)}'"
+        options += f"        '{name}') options='{' '.join(names)}' {first} ;;\n"
     return _BASH.format(
-        program=parser.prog, function=_function(parser), values=values, options=" ".join(names)
+        program=parser.prog,
+        function=_function(parser),
+        commands=_BASH_COMMANDS.format(names="|".join(commands)) if commands else "",
+        values=values,
+        options=options,
     )
 
 
@@ -84,8 +128,7 @@ def _zsh_action(action: argparse.Action) -> str:
     return "_files" if action.type is Path else " "
 
 
-def zsh_completion(parser: argparse.ArgumentParser) -> str:
-    """Returns a script that completes command lines in zsh, for a folder of its `fpath`."""
+def _zsh_arguments(parser: argparse.ArgumentParser, how: str) -> str:
     lines = []
     for action in _options(parser):
         others = "*" if isinstance(action, argparse._AppendAction) else ""
@@ -94,9 +137,27 @@ def zsh_completion(parser: argparse.ArgumentParser) -> str:
         text = _zsh_text(action.help or "")
         lines += [f"'{others}{name}[{text}]{value}'" for name in action.option_strings]
     lines += [f"':{_label(action)}:{_zsh_action(action)}'" for action in _arguments(parser)]
-    body = " \\\n    ".join(["_arguments -s -S", *lines])
-    head = f"#compdef {parser.prog}\n# zsh completion, printed by `{parser.prog} --completion zsh`"
-    return f'{head}\n{_function(parser)}() {{\n  {body}\n}}\n{_function(parser)} "$@"\n'
+    return " \\\n    ".join([f"  _arguments {how}", *lines])
+
+
+def zsh_completion(parser: argparse.ArgumentParser) -> str:
+    """Returns a script that completes command lines in zsh, for a folder of its `fpath`."""
+    function, commands = _function(parser), _commands(parser)
+    text = (
+        f"#compdef {parser.prog}\n# zsh completion, printed by `{parser.prog} --completion zsh`\n"
+    )
+    body = _zsh_arguments(parser, "-C" if commands else "-s -S") + "\n"
+    if commands:
+        told = {name: _zsh_text(each.description or "") for name, each in commands.items()}
+        body = _ZSH_COMMANDS.format(
+            texts="\n".join(f"    '{name}:{text}'" for name, text in told.items()),
+            arguments=body.rstrip(),
+            calls="\n".join(f"    {name}) {function}_{name} ;;" for name in commands),
+        )
+    text += f"{function}() {{\n{body}}}\n"
+    for name, each in commands.items():
+        text += f"{function}_{name}() {{\n{_zsh_arguments(each, '-s -S')}\n}}\n"
+    return f'{text}{function} "$@"\n'
 
 
 def _roff(text: str) -> str:
@@ -112,25 +173,40 @@ def _roff_entry(action: argparse.Action) -> str:
     return f".TP\n{heading}\n{_roff(action.help or '')}{required}\n"
 
 
-def man_page(parser: argparse.ArgumentParser) -> str:
-    """Returns the manual page, for `man`. It has no date: equal programs give equal bytes."""
-    description = _roff(parser.description or "")
-    needed = [
+def _roff_entries(parser: argparse.ArgumentParser) -> str:
+    return "".join(map(_roff_entry, [*_arguments(parser), *_options(parser)]))
+
+
+def _roff_synopsis(parser: argparse.ArgumentParser) -> str:
+    lines = [f".B {_roff(parser.prog)}"]
+    lines += [
         f"\\fB{_roff(action.option_strings[-1])}\\fR \\fI{_roff(_label(action))}\\fR"
         for action in _options(parser)
         if action.required
     ]
-    needed += [f"\\fI{_roff(_label(action))}\\fR" for action in _arguments(parser)]
-    entries = "".join(map(_roff_entry, [*_arguments(parser), *_options(parser)]))
+    lines += [f"\\fI{_roff(_label(action))}\\fR" for action in _arguments(parser)]
+    lines += ["[\\fIoptions\\fR]", *(["\\fIcommand\\fR"] if _commands(parser) else [])]
+    return "\n".join(lines) + "\n"
+
+
+def man_page(parser: argparse.ArgumentParser) -> str:
+    """Returns the manual page, for `man`. It has no date: equal programs give equal bytes."""
+    description = _roff(parser.description or "")
+    commands = "".join(
+        f".SS {_roff(name)}\n{_roff(each.description or '')}\n.PP\n"
+        f"{_roff_synopsis(each)}{_roff_entries(each)}"
+        for name, each in _commands(parser).items()
+    )
     others = "groundray", "groundray-golden", "groundray-view"
     see = " ,\n".join(f".BR {_roff(name)} (1)" for name in others)
     summary = description[:1].lower() + description[1:].rstrip(".")
     return (
         f'.TH {_roff(parser.prog.upper())} 1 "" "groundray" "User commands"\n'
         f".SH NAME\n{_roff(parser.prog)} \\- {summary}\n"
-        f".SH SYNOPSIS\n.B {_roff(parser.prog)}\n" + "\n".join(needed) + "\n[\\fIoptions\\fR]\n"
-        f".SH DESCRIPTION\n{description}\n.SH OPTIONS\n{entries}"
-        f".SH NOTES\n{_roff(parser.epilog or '')}\n.SH SEE ALSO\n{see}\n"
+        f".SH SYNOPSIS\n{_roff_synopsis(parser)}"
+        f".SH DESCRIPTION\n{description}\n.SH OPTIONS\n{_roff_entries(parser)}"
+        + (f".SH COMMANDS\n{commands}" if commands else "")
+        + f".SH NOTES\n{_roff(parser.epilog or '')}\n.SH SEE ALSO\n{see}\n"
     )
 
 
