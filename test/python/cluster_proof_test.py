@@ -1,46 +1,50 @@
 """A run on Dask workers that are killed at random, with a scheduler that is restarted, an S3 server
-that fails for a while and attempts that are doubled, has the bytes of a single run.
+that fails and is slow for a while and attempts that are doubled, has the bytes of a single run.
 
-GROUNDRAY_PROOF=full makes it large.
+GROUNDRAY_PROOF=full makes it large. The S3 server is then s3s-fs, which keeps objects on disk, if
+it is on PATH or named by GROUNDRAY_S3S_FS; otherwise it is moto, which keeps them in memory.
 """
 
+import contextlib
 import os
 import random
 import signal
 import subprocess
 import sys
 import time
+import warnings
 
 import pytest
-from cluster_runs import PACKAGE, arguments, cluster, started
-from cluster_store_test import Relay, bucket, dataset_in, free_port, port, serving  # noqa: F401
-from dataset_runs import ROOT, files, groundray
+from cluster_runs import (
+    PACKAGE,
+    PROGRAM,
+    arguments,
+    camera_run,
+    cluster,
+    faulty_program,
+    started,
+)
+from cluster_servers import (
+    ON_DISK,
+    Relay,
+    dataset_in,
+    disk_server,
+    free_port,
+    make_bucket,
+    memory_server,
+    point_to,
+    serving,
+)
 from groundray.cluster.store import Store
 
 pytest.importorskip("distributed", reason="the executor dask needs distributed")
+obstore = pytest.importorskip("obstore")
 
-SHARDS, KILLS = (200, 20) if os.environ.get("GROUNDRAY_PROOF") == "full" else (12, 3)
-CAMERA = """\
-groundray_camera: 1
-model: A small camera
-size_px: [32, 24]
-rate_hz: 10
-lens: {pinhole: {focal_px: [30, 30], centre_px: [15.5, 11.5]}}
-shutter: {exposure_ms: 1}
-products: [radiance, truth]
-sampling: {samples: 4, most_samples: 4}
-"""
-SCENE = f"""\
-groundray: 1
-seed: 5
-duration_s: {SHARDS / 10 + 0.3}
-terrain: {{dem: {ROOT / "data/terrain/prairie_1m.tif"}, material: dry_soil}}
-sky: {{analytic: {{}}, sun: {{azimuth_deg: 130, elevation_deg: 40}}}}
-platform:
-  drive: {{waypoints_m: [[429340, 5150600], [429560, 5150770]], speed_m_s: 8, height_m: 0.5}}
-cameras:
-  - {{name: eye, file: camera.yaml, mount: {{translation_m: [1, 0, 1.2]}}}}
-"""
+IS_FULL = os.environ.get("GROUNDRAY_PROOF") == "full"
+SHARDS, KILLS, PAUSES_S = (200, 20, (1, 6)) if IS_FULL else (8, 2, (0.3, 1))
+# Seconds from the beginning, in which the server is down, fails half of the time, or is slow.
+DOWN_S, FAILING_S, SLOW_S = ((15, 40), (50, 80), (90, 120)) if IS_FULL else ((2, 3), (4, 5), (6, 7))
+BUCKET = "runs"
 
 
 class Dask:
@@ -87,53 +91,90 @@ class Dask:
             process.wait()
 
 
-def test_kills_restarts_failures_and_doubled_attempts_change_no_byte(
-    tmp_path,
-    bucket,  # noqa: F811
-    port,  # noqa: F811
-    monkeypatch,
-):
-    (tmp_path / "scene.yaml").write_text(SCENE)
-    (tmp_path / "camera.yaml").write_text(CAMERA)
-    (tmp_path / "scratch").mkdir()
-    alone = groundray("generate", tmp_path / "scene.yaml", "-o", tmp_path / "out")
-    assert alone.returncode == 0, alone.stderr
-    url = f"s3://{bucket}/run"
-    begin = time.monotonic()
-    relay = Relay(port, lambda count: 20 < time.monotonic() - begin < 23 or count % 10 == 0)
+@contextlib.contextmanager
+def s3_server(folder):
+    """Runs an S3 server with a bucket: in full one on disk, if there is one."""
+    if IS_FULL and ON_DISK:
+        (folder / "objects" / BUCKET).mkdir(parents=True)
+        with disk_server(folder / "objects") as port:
+            yield port
+        return
+    if IS_FULL:
+        warnings.warn(
+            "there is no s3s-fs on PATH or in GROUNDRAY_S3S_FS: objects are in memory, in moto",
+            stacklevel=1,
+        )
+    with memory_server() as port:
+        make_bucket(port, BUCKET)
+        yield port
+
+
+def test_kills_restarts_failures_and_doubled_attempts_change_no_byte(tmp_path, monkeypatch, capsys):
+    scene, whole = camera_run(tmp_path, SHARDS + 3)
+    scratch = tmp_path / "scratch"
+    scratch.mkdir()
+    url = f"s3://{BUCKET}/run"
+    given = [*arguments(scene, url, shards=SHARDS), "--threads", 1, "--scratch", scratch]
+    shard = ["shard", scene, *given[4:], "--shard"]
     chance = random.Random(3)
-    with serving(monkeypatch, relay):
-        dask = Dask(tmp_path)
-        try:
-            given = [*arguments(tmp_path / "scene.yaml", url, shards=SHARDS), "--threads", 1]
-            given += ["--scratch", tmp_path / "scratch"]
-            on_dask = [*given, "--executor", f"dask://127.0.0.1:{dask.port}"]
-            shard = ["shard", given[1], *given[4:], "--shard"]
-            doubled = [started(*shard, f"{i}/{SHARDS}") for i in (1, 2)]
-            run, killed, runs = started(*on_dask), 0, 1
-            store = Store(url)
+    with s3_server(tmp_path) as port:
+        begin = time.monotonic()
 
-            def done():
-                return sum(each.key.endswith(".done") for each in store.list("shards"))
+        def is_within(span):
+            return span[0] < time.monotonic() - begin < span[1]
 
-            while run.poll() != 0:
-                if run.poll() is not None:
-                    assert "lost the scheduler; run the same command again" in run.stderr.read()
-                    run, runs = started(*on_dask), runs + 1
-                if killed < KILLS and (workers := dask.workers()):
-                    os.kill(int(chance.choice(workers)), signal.SIGKILL)
-                    killed += 1
-                if runs == 1 and done() > SHARDS // 2:
-                    dask.restart()
-                    run.wait(timeout=120)
-                time.sleep(chance.uniform(1, 5))
-                assert time.monotonic() - begin < 1800
-            for each in doubled:
-                assert each.wait(timeout=60) == 0
-        finally:
-            run.kill()
-            dask.stop()
+        relay = Relay(
+            port,
+            lambda count: (
+                is_within(DOWN_S) or count % 10 == 0 or (is_within(FAILING_S) and count % 2 == 0)
+            ),
+            lambda: chance.uniform(0.2, 1) if is_within(SLOW_S) else 0,
+        )
+        with serving(monkeypatch, relay):
+            dask = Dask(tmp_path)
+            try:
+                on_dask = [*given, "--executor", f"dask://127.0.0.1:{dask.port}"]
+                doubled = [started(*shard, f"{i}/{SHARDS}") for i in (1, 1, 2)]
+                run, killed, runs = started(*on_dask), 0, 1
+                store = Store(url)
+
+                def done():
+                    return sum(each.key.endswith(".done") for each in store.list("shards"))
+
+                while run.poll() != 0:
+                    if run.poll() is not None:
+                        assert "lost the scheduler; run the same command again" in run.stderr.read()
+                        run, runs = started(*on_dask), runs + 1
+                    if killed < KILLS and (workers := dask.workers()):
+                        os.kill(int(chance.choice(workers)), signal.SIGKILL)
+                        killed += 1
+                    if runs == 1 and done() > SHARDS // 2:
+                        dask.restart()
+                        run.wait(timeout=120)
+                    time.sleep(chance.uniform(*PAUSES_S))
+                    assert time.monotonic() - begin < 3600
+                for each in doubled:
+                    assert each.wait(timeout=60) == 0
+            finally:
+                run.kill()
+                dask.stop()
+        took_s = time.monotonic() - begin
         assert (killed, runs) == (KILLS, 2)
-        assert dataset_in(url) == files(tmp_path / "out")
+        assert relay.failed > SHARDS // 2
+        assert relay.delayed > 0
+        point_to(monkeypatch, port)
+        assert dataset_in(url) == whole
         assert cluster("verify", url) == 0
-    assert relay.failed > SHARDS // 2
+        told = f"{SHARDS} shards, {KILLS} kills: {took_s:.0f} s; {relay.count} requests, "
+        capsys.readouterr()
+
+        # Another attempt at shard 2, on a faulty machine, after one that died before its marker.
+        obstore.delete(Store(url)._store, "shards/2.done")
+        faulty = faulty_program(tmp_path, "camera/eye/*.exr")
+        assert cluster(*shard, f"2/{SHARDS}", "--groundray", faulty) == 1
+        assert f"{url}/dataset/camera/eye/" in (fault := capsys.readouterr().err)
+        assert ".exr: it has other bytes than this attempt made" in fault
+        assert cluster(*shard, f"2/{SHARDS}", "--groundray", PROGRAM) == 0
+        assert dataset_in(url) == whole
+    with capsys.disabled():
+        print(f"\n{told}{relay.failed} failed, {relay.delayed} delayed")

@@ -19,6 +19,7 @@ from cluster_runs import (
     arguments,
     calls,
     cluster,
+    faulty_program,
     hanging,
     is_alive,
     pid_in,
@@ -156,24 +157,6 @@ def test_two_attempts_at_a_shard_at_once_agree(tmp_path):
     assert make_shard(task(store), 2) == "there"
 
 
-# Changes the last byte of a file in a shard and its checksum, as a faulty processor would.
-FAULTY = """python3 - "$@" <<'END'
-import hashlib, pathlib, re, subprocess, sys
-subprocess.run(["{real}", *sys.argv[1:]], check=True)
-out = pathlib.Path(sys.argv[sys.argv.index("-o") + 1])
-file = next(out.glob("{file}"))
-before = file.read_bytes()
-after = before[:-1] + bytes([before[-1] ^ 1])
-file.write_bytes(after)
-record = out / "dataset.yaml"
-text = record.read_text().rsplit("sha256_above", 1)[0]
-sums = [hashlib.sha256(each).hexdigest() for each in (before, after)]
-text = text.replace(*sums)
-record.write_text(text + 'sha256_above: "' + hashlib.sha256(text.encode()).hexdigest() + '"\\n')
-END
-exit"""
-
-
 @pytest.mark.parametrize(
     ("file", "named"),
     [
@@ -191,7 +174,7 @@ def test_a_machine_that_makes_other_bytes_is_found_and_the_object_named(
     (store / "shards/1.done").unlink()
     (store / "dataset/dataset.yaml").unlink()
     before = files(store)
-    faulty = program(tmp_path, FAULTY.format(real=PROGRAM, file=file))
+    faulty = faulty_program(tmp_path, file)
     assert cluster(*arguments(single_run()[0], store.as_uri(), "--groundray", faulty)) == 1
     assert re.search(named, capsys.readouterr().err)
     assert len(calls(tmp_path)) == 1  # another attempt would not help
@@ -394,7 +377,9 @@ def test_a_fault_of_the_scene_is_reported_once_and_ends_the_run(tmp_path, capsys
 def test_faults_of_the_surroundings_have_one_message(tmp_path, capsys, change, message):
     url = (tmp_path / "store").as_uri()
     if change[0] == "--executor":
+        dask = pytest.importorskip("dask")
         pytest.importorskip("distributed")
+        dask.config.set({"distributed.comm.timeouts.connect": "2s"})
     assert cluster(*arguments(single_run()[0], url), "--retries", 0, *change) == 1
     *_, line = capsys.readouterr().err.splitlines()
     assert re.search(message, line)

@@ -20,6 +20,42 @@ pytest.importorskip("obstore", reason="groundray-cluster needs obstore")
 from groundray.cluster import command  # noqa: E402
 
 SHARDS = 6
+CAMERA = """\
+groundray_camera: 1
+model: A small camera
+size_px: [32, 24]
+rate_hz: 10
+lens: {pinhole: {focal_px: [30, 30], centre_px: [15.5, 11.5]}}
+shutter: {exposure_ms: 1}
+products: [radiance, truth]
+sampling: {samples: 1, most_samples: 1}
+"""
+SCENE = """\
+groundray: 1
+seed: 5
+terrain: {dem: %s, material: dry_soil}
+sky: {analytic: {}, sun: {azimuth_deg: 130, elevation_deg: 40}}
+platform:
+  drive: {waypoints_m: [[429340, 5150600], [429560, 5150770]], speed_m_s: 2, height_m: 0.5}
+cameras:
+  - {name: eye, file: camera.yaml, mount: {translation_m: [1, 0, 1.2]}}
+"""
+# Changes the last byte of a file in a shard and its checksum, as a faulty processor would.
+FAULTY = """python3 - "$@" <<'END'
+import hashlib, pathlib, re, subprocess, sys
+subprocess.run(["{real}", *sys.argv[1:]], check=True)
+out = pathlib.Path(sys.argv[sys.argv.index("-o") + 1])
+file = next(out.glob("{file}"))
+before = file.read_bytes()
+after = before[:-1] + bytes([before[-1] ^ 1])
+file.write_bytes(after)
+record = out / "dataset.yaml"
+text = record.read_text().rsplit("sha256_above", 1)[0]
+sums = [hashlib.sha256(each).hexdigest() for each in (before, after)]
+text = text.replace(*sums)
+record.write_text(text + 'sha256_above: "' + hashlib.sha256(text.encode()).hexdigest() + '"\\n')
+END
+exit"""
 
 
 @functools.cache
@@ -28,6 +64,23 @@ def single_run():
     folder = Path(tempfile.mkdtemp(prefix="groundray-cluster-test-"))
     dataset_runs.make_whole(folder)
     return folder / "scene.yaml", files(folder / "out")
+
+
+def camera_scene(folder, frames):
+    """Writes the scene of a run of so many small images."""
+    terrain = ROOT / "data/terrain/prairie_1m.tif"
+    scene = folder / "scene.yaml"
+    scene.write_text(SCENE % terrain + f"duration_s: {frames / 10}\n")
+    (folder / "camera.yaml").write_text(CAMERA)
+    return scene
+
+
+def camera_run(folder, frames):
+    """Returns such a scene and the files of its dataset, as a single run makes them."""
+    scene = camera_scene(folder, frames)
+    alone = dataset_runs.groundray("generate", scene, "-o", folder / "out")
+    assert alone.returncode == 0, alone.stderr
+    return scene, files(folder / "out")
 
 
 def arguments(scene, store, *more, shards=SHARDS):
@@ -64,6 +117,11 @@ def program(folder, before="", version=""):
     )
     file.chmod(0o755)
     return file
+
+
+def faulty_program(folder, file):
+    """Makes a program whose file (the first that a pattern finds) has other bytes."""
+    return program(folder, FAULTY.format(real=PROGRAM, file=file))
 
 
 def hanging(folder):

@@ -1,134 +1,29 @@
 """groundray-cluster with S3 servers: equal bytes, also from one that fails, and its faults."""
 
-import http.client
-import socket
-import subprocess
-import sys
-import threading
 import time
-import urllib.request
-from contextlib import contextmanager
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
+import obstore
 import pytest
-from cluster_runs import arguments, cluster, single_run, wait_for
+from cluster_runs import arguments, cluster, single_run
+from cluster_servers import Relay, dataset_in, make_bucket, memory_server, point_to, serving
 from dataset_runs import groundray
 from groundray.cluster.store import Store
-
-pytest.importorskip("moto.server", reason="an S3 server for tests is in moto[server]")
-
-
-def free_port():
-    with socket.socket() as found:
-        found.bind(("127.0.0.1", 0))
-        return found.getsockname()[1]
 
 
 @pytest.fixture(scope="module")
 def port():
     """Port of an S3 server that keeps objects in memory."""
-    number = free_port()
-    command = [sys.executable, "-m", "moto.server", "-H", "127.0.0.1", "-p", str(number)]
-    server = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-
-    def answers():
-        with socket.socket() as probe:
-            return probe.connect_ex(("127.0.0.1", number)) == 0
-
-    try:
-        wait_for(answers)
+    with memory_server() as number:
         yield number
-    finally:
-        server.kill()
-        server.wait()
-
-
-def point_to(monkeypatch, port):
-    values = {
-        "AWS_ACCESS_KEY_ID": "key",
-        "AWS_SECRET_ACCESS_KEY": "secret",
-        "AWS_REGION": "us-east-1",
-        "AWS_ENDPOINT_URL": f"http://127.0.0.1:{port}",
-    }
-    for name, value in values.items():
-        monkeypatch.setenv(name, value)
 
 
 @pytest.fixture
 def bucket(port, monkeypatch, request):
     """A new bucket, whose server the environment names."""
     name = "bucket-" + str(abs(hash(request.node.name)))
-    call = urllib.request.Request(f"http://127.0.0.1:{port}/{name}", method="PUT")
-    urllib.request.urlopen(call).close()
+    make_bucket(port, name)
     point_to(monkeypatch, port)
     return name
-
-
-def dataset_in(url):
-    """Reads the objects of a dataset as files of a folder."""
-    store = Store(url)
-    return {
-        each.key.removeprefix("dataset/"): store.get(each.key) for each in store.list("dataset")
-    }
-
-
-class Handler(BaseHTTPRequestHandler):
-    """Answers as the function `answer` of its server says: status, headers, body."""
-
-    protocol_version = "HTTP/1.1"
-
-    def handle_request(self):
-        body = self.rfile.read(int(self.headers.get("Content-Length", 0)))
-        status, headers, answer = self.server.answer(self, body)
-        self.send_response(status)
-        for name, value in headers.items():
-            self.send_header(name, value)
-        self.end_headers()
-        self.wfile.write(answer)
-
-    do_GET = do_PUT = do_HEAD = do_POST = do_DELETE = handle_request
-
-    def log_message(self, *_):
-        pass
-
-
-@contextmanager
-def serving(monkeypatch, answer):
-    """Runs a server on this machine, which the environment names."""
-    with ThreadingHTTPServer(("127.0.0.1", 0), Handler) as server:
-        server.answer = answer
-        point_to(monkeypatch, server.server_address[1])
-        threading.Thread(target=server.serve_forever, daemon=True).start()
-        yield
-        server.shutdown()
-
-
-class Relay:
-    """Relays requests to a server, but answers some with 500: half of them after it has acted."""
-
-    def __init__(self, port, is_failing):
-        self.port, self.is_failing = port, is_failing
-        self.count = self.failed = 0
-        self.lock = threading.Lock()
-
-    def __call__(self, request, body):
-        with self.lock:
-            self.count += 1
-            fails = self.is_failing(self.count)
-            self.failed += fails
-            acts = not fails or self.failed % 2 == 0
-        headers, answer = {}, b""
-        if acts:
-            server = http.client.HTTPConnection("127.0.0.1", self.port)
-            server.request(request.command, request.path, body, dict(request.headers))
-            got = server.getresponse()
-            headers, answer = dict(got.getheaders()), got.read()
-            server.close()
-        if fails:
-            return 500, {"Content-Length": "0"}, b""
-        for name in ("Transfer-Encoding", "Connection", "Date", "Server"):
-            headers.pop(name, None)
-        return got.status, {"Content-Length": str(len(answer)), **headers}, answer
 
 
 def test_a_run_in_a_bucket_has_the_bytes_of_a_single_run(bucket, capsys):
@@ -155,6 +50,30 @@ def test_a_server_that_fails_for_a_while_and_then_now_and_again_changes_nothing(
         assert cluster(*arguments(scene, url, shards=2)) == 0
         assert dataset_in(url) == whole
     assert relay.failed > 10
+
+
+def test_merge_reads_no_file_of_the_dataset(bucket, port, monkeypatch):
+    """Files are under their final names from the beginning: nothing is copied."""
+    scene, whole = single_run()
+    url = f"s3://{bucket}/run"
+    assert cluster(*arguments(scene, url, shards=3)) == 0
+    obstore.delete(Store(url)._store, "dataset/dataset.yaml")
+    relay = Relay(port)
+    with serving(monkeypatch, relay):
+        assert cluster("merge", url) == 0
+    point_to(monkeypatch, port)
+    assert dataset_in(url) == whole
+    keys = [
+        (method, path.partition("/run/")[2])
+        for method, path, _ in relay.relayed
+        if "?" not in path  # of a listing
+    ]
+    markers = [f"shards/{i}.done" for i in (1, 2, 3)]
+    assert keys == [
+        *(("GET", key) for key in ("run.json", "common.yaml", *markers, "dataset/dataset.yaml")),
+        ("PUT", "dataset/dataset.yaml"),
+    ]
+    assert sum(size for _, _, size in relay.relayed) < 5 * len(whole["dataset.yaml"])
 
 
 def test_other_bytes_in_the_bucket_are_named_and_kept(bucket, capsys):

@@ -77,7 +77,7 @@ def run_dask(address: str, jobs: Sequence[Job], retries: int) -> Iterator[Outcom
     for name in ("distributed", "distributed.client"):
         logging.getLogger(name).setLevel(logging.CRITICAL)  # faults are told here, in one line
     try:
-        client = dask.Client(address, timeout=20)
+        client = dask.Client(address)
     except (OSError, ValueError) as fault:
         raise Error(f"{address}: no scheduler answers: {fault}") from None
     with client:
