@@ -41,14 +41,13 @@ pytest.importorskip("distributed", reason="the executor dask needs distributed")
 obstore = pytest.importorskip("obstore")
 
 IS_FULL = os.environ.get("GROUNDRAY_PROOF") == "full"
-SHARDS, KILLS, PAUSES_S = (200, 20, (1, 6)) if IS_FULL else (8, 2, (0.3, 1))
-# Seconds from the beginning, in which the server is down, fails half of the time, or is slow.
-DOWN_S, FAILING_S, SLOW_S = ((15, 40), (50, 80), (90, 120)) if IS_FULL else ((2, 3), (4, 5), (6, 7))
+SHARDS, WORKERS, KILLS, PAUSES_S = (200, 4, 20, (1, 6)) if IS_FULL else (6, 2, 2, (0.3, 1))
+DOWN_S = 25 if IS_FULL else 1  # more than an attempt at a request, less than all of them
 BUCKET = "runs"
 
 
 class Dask:
-    """A scheduler and four workers, as processes."""
+    """A scheduler and its workers, as processes."""
 
     def __init__(self, folder):
         self.folder, self.port = folder, free_port()
@@ -70,7 +69,7 @@ class Dask:
     def start(self):
         self.scheduler = self.process("scheduler", "--host", "127.0.0.1", "--port", str(self.port))
         address = f"tcp://127.0.0.1:{self.port}"
-        self.guards = [self.process("worker", address, "--nthreads", "1") for _ in range(4)]
+        self.guards = [self.process("worker", address, "--nthreads", "1") for _ in range(WORKERS)]
 
     def restart(self):
         """Kills the scheduler, after which workers end by themselves, and starts all again."""
@@ -89,6 +88,32 @@ class Dask:
         for process in (*self.guards, self.scheduler):
             process.kill()  # and the workers end without their guards
             process.wait()
+
+
+class FailingRelay(Relay):
+    """Relay to a server that fails now and again, and worse from one tenth of the shards on: it is
+    down for a while, then fails half of the time, and later, from half of the shards on, is slow.
+    """
+
+    def __init__(self, port):
+        super().__init__(port)
+        self.chance, self.down_since_s = random.Random(4), None
+
+    def share_done(self):
+        """Returns the share of the shards whose markers were written."""
+        written = {path for method, path, _ in self.relayed if method == "PUT"}
+        return sum(path.endswith(".done") for path in written) / SHARDS
+
+    def is_failing(self, count):
+        share = self.share_done()
+        if share >= 0.1:
+            self.down_since_s = self.down_since_s or time.monotonic()
+            if time.monotonic() < self.down_since_s + DOWN_S:
+                return True
+        return count % (2 if 0.1 <= share < 0.3 else 10) == 0
+
+    def delay_s(self):
+        return self.chance.uniform(0.2, 1) if 0.5 <= self.share_done() < 0.7 else 0
 
 
 @contextlib.contextmanager
@@ -119,17 +144,7 @@ def test_kills_restarts_failures_and_doubled_attempts_change_no_byte(tmp_path, m
     chance = random.Random(3)
     with s3_server(tmp_path) as port:
         begin = time.monotonic()
-
-        def is_within(span):
-            return span[0] < time.monotonic() - begin < span[1]
-
-        relay = Relay(
-            port,
-            lambda count: (
-                is_within(DOWN_S) or count % 10 == 0 or (is_within(FAILING_S) and count % 2 == 0)
-            ),
-            lambda: chance.uniform(0.2, 1) if is_within(SLOW_S) else 0,
-        )
+        relay = FailingRelay(port)
         with serving(monkeypatch, relay):
             dask = Dask(tmp_path)
             try:
@@ -161,7 +176,7 @@ def test_kills_restarts_failures_and_doubled_attempts_change_no_byte(tmp_path, m
         took_s = time.monotonic() - begin
         assert (killed, runs) == (KILLS, 2)
         assert relay.failed > SHARDS // 2
-        assert relay.delayed > 0
+        assert relay.delayed > SHARDS // 4
         point_to(monkeypatch, port)
         assert dataset_in(url) == whole
         assert cluster("verify", url) == 0

@@ -128,13 +128,21 @@ class Relay:
     later.
     """
 
-    def __init__(self, port, is_failing=lambda count: False, delay_s=lambda: 0):
-        self.port, self.is_failing, self.delay_s = port, is_failing, delay_s
+    def __init__(self, port):
+        self.port = port
         self.count = self.failed = self.delayed = 0
         self.relayed = []
         """Method, path and size of the answer of each request."""
         self.lock = threading.Lock()
         self.turns = collections.defaultdict(threading.Lock)
+
+    def is_failing(self, count):
+        """Returns true if the request of this number, from 1, is answered with 500."""
+        return False
+
+    def delay_s(self):
+        """Returns the time for which a request waits."""
+        return 0
 
     def __call__(self, request, body):
         with self.lock:
