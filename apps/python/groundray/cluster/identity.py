@@ -25,7 +25,11 @@ def log_of(shard: int) -> str:
 
 @dataclass(frozen=True)
 class Identity:
-    """What the bytes of a run's objects depend on, except the files that the scene names."""
+    """What the bytes of a run's objects depend on, with the files that the scene names.
+
+    Those are compared by their checksums in `common.yaml`. Processors and C libraries need no
+    comparison: elementary functions have the same bits on all (core/math.h).
+    """
 
     scene: str
     scene_sha256: str
