@@ -23,10 +23,12 @@ from cluster_runs import (
     cluster,
     faulty_program,
     started,
+    wait_for,
 )
 from cluster_servers import (
     ON_DISK,
     Relay,
+    answers,
     dataset_in,
     disk_server,
     free_port,
@@ -70,6 +72,7 @@ class Dask:
         self.scheduler = self.process("scheduler", "--host", "127.0.0.1", "--port", str(self.port))
         address = f"tcp://127.0.0.1:{self.port}"
         self.guards = [self.process("worker", address, "--nthreads", "1") for _ in range(WORKERS)]
+        wait_for(lambda: answers(self.port))
 
     def restart(self):
         """Kills the scheduler, after which workers end by themselves, and starts all again."""
@@ -135,6 +138,8 @@ def s3_server(folder):
 
 
 def test_kills_restarts_failures_and_doubled_attempts_change_no_byte(tmp_path, monkeypatch, capsys):
+    if not IS_FULL:  # or the command waits for half a minute for the killed scheduler
+        monkeypatch.setenv("DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT", "10s")
     scene, whole = camera_run(tmp_path, SHARDS + 3)
     scratch = tmp_path / "scratch"
     scratch.mkdir()

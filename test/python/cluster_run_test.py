@@ -1,5 +1,7 @@
 """groundray-cluster with a store in a folder: equal bytes, after kills and repetitions."""
 
+import contextlib
+import importlib
 import importlib.util
 import os
 import re
@@ -376,11 +378,14 @@ def test_a_fault_of_the_scene_is_reported_once_and_ends_the_run(tmp_path, capsys
 )
 def test_faults_of_the_surroundings_have_one_message(tmp_path, capsys, change, message):
     url = (tmp_path / "store").as_uri()
+    patience = contextlib.nullcontext()
     if change[0] == "--executor":
-        dask = pytest.importorskip("dask")
         pytest.importorskip("distributed")
-        dask.config.set({"distributed.comm.timeouts.connect": "2s"})
-    assert cluster(*arguments(single_run()[0], url), "--retries", 0, *change) == 1
+        patience = importlib.import_module("dask").config.set(
+            {"distributed.comm.timeouts.connect": "2s"}
+        )
+    with patience:
+        assert cluster(*arguments(single_run()[0], url), "--retries", 0, *change) == 1
     *_, line = capsys.readouterr().err.splitlines()
     assert re.search(message, line)
 

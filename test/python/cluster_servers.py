@@ -29,19 +29,24 @@ def free_port():
         return found.getsockname()[1]
 
 
+def answers(port):
+    """Returns true if a server on this machine listens to a port."""
+    with socket.socket() as probe:
+        return probe.connect_ex(("127.0.0.1", port)) == 0
+
+
 @contextlib.contextmanager
 def _started(port, *command):
     server = subprocess.Popen(
         list(map(str, command)), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
     )
 
-    def answers():
+    def is_ready():
         assert server.poll() is None, command
-        with socket.socket() as probe:
-            return probe.connect_ex(("127.0.0.1", port)) == 0
+        return answers(port)
 
     try:
-        wait_for(answers)
+        wait_for(is_ready)
         yield port
     finally:
         server.kill()

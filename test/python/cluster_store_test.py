@@ -45,7 +45,7 @@ def test_a_server_that_fails_for_a_while_and_then_now_and_again_changes_nothing(
     scene, whole = single_run()
     begin = time.monotonic()
     relay = Relay(port)
-    relay.is_failing = lambda count: time.monotonic() < begin + 2 or count % 4 == 0
+    relay.is_failing = lambda count: time.monotonic() < begin + 1 or count % 5 == 0
     url = f"s3://{bucket}/run"
     with serving(monkeypatch, relay):
         assert cluster(*arguments(scene, url, shards=2)) == 0

@@ -27,7 +27,7 @@ def log_of(shard: int) -> str:
 class Identity:
     """What the bytes of a run's objects depend on, with the files that the scene names.
 
-    Those are compared by their checksums in `common.yaml`. Processors and C libraries need no
+    Those are compared by their fingerprint in `common.yaml`. Processors and C libraries need no
     comparison: elementary functions have the same bits on all (core/math.h).
     """
 
