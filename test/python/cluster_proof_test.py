@@ -44,6 +44,7 @@ obstore = pytest.importorskip("obstore")
 
 IS_FULL = os.environ.get("GROUNDRAY_PROOF") == "full"
 SHARDS, WORKERS, KILLS, PAUSES_S = (200, 4, 20, (1, 6)) if IS_FULL else (6, 2, 2, (0.3, 1))
+DELAY_S = (0.2, 1) if IS_FULL else (0.05, 0.2)
 DOWN_S = 25 if IS_FULL else 1  # more than an attempt at a request, less than all of them
 BUCKET = "runs"
 
@@ -70,9 +71,15 @@ class Dask:
 
     def start(self):
         self.scheduler = self.process("scheduler", "--host", "127.0.0.1", "--port", str(self.port))
-        address = f"tcp://127.0.0.1:{self.port}"
-        self.guards = [self.process("worker", address, "--nthreads", "1") for _ in range(WORKERS)]
         wait_for(lambda: answers(self.port))
+        self.guards = [self.worker() for _ in range(WORKERS)]
+
+    def worker(self):
+        return self.process("worker", f"tcp://127.0.0.1:{self.port}", "--nthreads", "1")
+
+    def revive(self):
+        """Starts workers again whose guards have ended too, because they were killed early."""
+        self.guards = [each if each.poll() is None else self.worker() for each in self.guards]
 
     def restart(self):
         """Kills the scheduler, after which workers end by themselves, and starts all again."""
@@ -116,7 +123,7 @@ class FailingRelay(Relay):
         return count % (2 if 0.1 <= share < 0.3 else 10) == 0
 
     def delay_s(self):
-        return self.chance.uniform(0.2, 1) if 0.5 <= self.share_done() < 0.7 else 0
+        return self.chance.uniform(*DELAY_S) if 0.5 <= self.share_done() < 0.7 else 0
 
 
 @contextlib.contextmanager
@@ -139,7 +146,7 @@ def s3_server(folder):
 
 def test_kills_restarts_failures_and_doubled_attempts_change_no_byte(tmp_path, monkeypatch, capsys):
     if not IS_FULL:  # or the command waits for half a minute for the killed scheduler
-        monkeypatch.setenv("DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT", "10s")
+        monkeypatch.setenv("DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT", "5s")
     scene, whole = camera_run(tmp_path, SHARDS + 3)
     scratch = tmp_path / "scratch"
     scratch.mkdir()
@@ -168,6 +175,7 @@ def test_kills_restarts_failures_and_doubled_attempts_change_no_byte(tmp_path, m
                     if killed < KILLS and (workers := dask.workers()):
                         os.kill(int(chance.choice(workers)), signal.SIGKILL)
                         killed += 1
+                    dask.revive()
                     if runs == 1 and done() > SHARDS // 2:
                         dask.restart()
                         run.wait(timeout=120)
