@@ -113,7 +113,7 @@ PYTHON_CALLS = {
         "dataset.py"
     ),
     r"\bshutil\.copy|\bcopyfile(obj)?\(|\bZipFile\(|\bTarFile\(": "",
-    r"\.open\(": "export/las.py export/mcap_file.py export/images.py dataset.py",
+    r"\.open\(": "cluster/shard.py export/las.py export/mcap_file.py export/images.py dataset.py",
 }
 
 # The passes also run on devices, for which only these headers exist.

@@ -96,7 +96,10 @@ def test_what_an_alias_shares_changes_only_where_it_is_named(folder):
         ("scene: scene.yaml\nshards: 1\nruns: [3]\n", r"runs[0] must be a map"),
         ("scene: scene.yaml\nshards: 1\nruns: [{sky.moon.x: 3}]\n", "has no moon"),
         ("scene: scene.yaml\nshards: 1\nvary: {lidars.rear.name: [a]}\n", "has no rear"),
-        ("scene: none.yaml\nshards: 1\nruns: [{}]\n", "none.yaml: No such file or directory"),
+        (
+            "scene: none.yaml\nshards: 1\nruns: [{}]\n",
+            "none.yaml: cannot read it: No such file or directory; name a YAML file",
+        ),
         ("scene: scene.yaml\nshard: 1\n", "unknown key shard; it may have scene, shards, vary"),
         ("scene: [\n", "params.yaml: while parsing"),
     ],

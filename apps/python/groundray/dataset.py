@@ -234,7 +234,8 @@ def open_regular(path: Path) -> BinaryIO:
     return file
 
 
-def _bytes_of(path: Path) -> bytes:
+def read_bytes(path: Path) -> bytes:
+    """Returns the bytes of a regular file. Raises OSError, too if memory does not suffice."""
     with open_regular(path) as file:
         size = os.fstat(file.fileno()).st_size
         if size > available_bytes():
@@ -252,7 +253,7 @@ def available_bytes() -> float:
 def read_text(path: Path, hint: str = "is the dataset complete?") -> str:
     """Returns a file's text. Raises Error, with the hint, if it cannot be read."""
     try:
-        return _bytes_of(path).decode("utf-8").replace("\r\n", "\n")
+        return read_bytes(path).decode("utf-8").replace("\r\n", "\n")
     except OSError as fault:
         raise Error(f"{path}: cannot read it: {fault.strerror}; {hint}") from None
     except UnicodeDecodeError:
@@ -269,7 +270,7 @@ def read_yaml(path: Path, hint: str = "is the dataset complete?") -> Any:
 def read_listed(file: Path, what: str) -> bytes:
     """Returns the bytes of a finished frame's file. Raises Error if it cannot be read."""
     try:
-        return _bytes_of(file)
+        return read_bytes(file)
     except OSError as fault:
         rule = f"cannot read it: {fault.strerror}, although dataset.yaml lists {what} as done"
         raise Error(f"{file}: {rule}; was it removed?") from None

@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 
 from groundray.cluster.store import FinalError, Store, sum_of
+from groundray.dataset import read_bytes
 
 RECORD, COMMON, SCENE = "run.json", "common.yaml", "scene.yaml"
 DATASET = "dataset/dataset.yaml"
@@ -78,7 +79,7 @@ class Task:
     def identity(self) -> Identity:
         """Reads the scene and asks the program, on this machine."""
         try:
-            scene = Path(self.scene).read_bytes()
+            scene = read_bytes(Path(self.scene))
         except OSError as fault:
             raise FinalError(
                 f"{self.scene}: {fault.strerror}; each machine needs the scene, and the files that "

@@ -21,7 +21,7 @@ from pathlib import Path
 from groundray.cluster.identity import COMMON, Task, log_of, marker_of
 from groundray.cluster.listing import Listed, Listing, closed, difference
 from groundray.cluster.store import FinalError, Store, sum_of
-from groundray.dataset import Error
+from groundray.dataset import Error, read_bytes
 
 _LIBC = ctypes.CDLL(None)  # loaded before any fork
 _PR_SET_PDEATHSIG = 1
@@ -77,7 +77,7 @@ class _Log:
     def put(self, output: Path | None = None, end: bytes = b"") -> None:
         """Copies the log, with what the program has printed, to the store."""
         if output is not None:
-            self._output = output.read_bytes()
+            self._output = read_bytes(output)
         with suppress(Error):
             self._store.put(self._key, (self._before + self._output + end)[-_MOST_LOG:])
 
@@ -155,7 +155,7 @@ def _generate(task: Task, shard: int, folder: Path, log: _Log, stop: threading.E
         log.put(output)
     if child.returncode == 0:
         return
-    said = output.read_text(errors="replace").rpartition("groundray: ")[2]
+    said = read_bytes(output).decode(errors="replace").rpartition("groundray: ")[2]
     why = " ".join(said.split())[:_MOST_REASON]
     if child.returncode < 0:
         why = f"groundray was ended by {signal.Signals(-child.returncode).name}"
@@ -181,7 +181,7 @@ def _upload(store: Store, shard: int, out: Path) -> None:
             )
 
     def upload(file: Listed) -> None:
-        data = (out / file.path).read_bytes()
+        data = read_bytes(out / file.path)
         if sum_of(data) != file.sum:
             raise Error(f"{out / file.path}: changed since it was written; check the disk")
         store.put_once(f"dataset/{file.path}", data)

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import yaml
 
-from groundray.dataset import Error
+from groundray.dataset import Error, read_bytes, read_text
 
 _KEYS = ("scene", "shards", "vary", "runs")
 
@@ -33,10 +33,8 @@ class Sweep(NamedTuple):
 
 def _load(path: Path) -> yaml.Node:
     try:
-        node = yaml.compose(path.read_text(encoding="utf-8"))
-    except OSError as fault:
-        raise Error(f"{path}: {fault.strerror}") from None
-    except (yaml.YAMLError, UnicodeDecodeError) as fault:
+        node = yaml.compose(read_text(path, "name a YAML file"))
+    except yaml.YAMLError as fault:
         raise Error(f"{path}: {' '.join(str(fault).split())}") from None
     if not isinstance(node, yaml.MappingNode):
         raise Error(f"{path}: it must be a map of keys and values")
@@ -143,7 +141,7 @@ def write_scene(sweep: Sweep, run: Run) -> Path:
     """Writes the scene of a run beside that which it varies, so that its paths hold."""
     file = sweep.scene.with_name(f"{sweep.scene.stem}.{run.name}{sweep.scene.suffix}")
     try:
-        if file.exists() and file.read_bytes() != run.scene:
+        if file.exists() and read_bytes(file) != run.scene:
             raise Error(f"{file}: another file of this name exists; remove it, or move the scene")
         file.write_bytes(run.scene)
     except OSError as fault:
