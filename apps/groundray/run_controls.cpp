@@ -33,12 +33,16 @@ void RunControls::add(CLI::App* command) {
   command->add_flag("-q,--quiet", is_quiet,
                     "Print no progress and no notes on standard error, only the error that ends "
                     "the command");
+  command->add_flag("--network", is_network_open,
+                    "Permit rasters on servers: /vsicurl/https://..., /vsis3/BUCKET/...; as "
+                    "$GROUNDRAY_NETWORK=1");
 }
 
 AppliedControls::AppliedControls(const RunControls& controls) {
   if (controls.threads)
     threads_.emplace(tbb::global_control::max_allowed_parallelism, *controls.threads);
   if (controls.is_quiet) shown_ = silence_stderr();
+  if (controls.is_network_open) setenv("GROUNDRAY_NETWORK", "1", 1);
 }
 
 AppliedControls::~AppliedControls() {

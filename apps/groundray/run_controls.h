@@ -12,6 +12,7 @@ namespace groundray {
 struct RunControls {
   std::optional<std::size_t> threads;  ///< most threads that compute; default: all cores
   bool is_quiet = false;               ///< true to print nothing on standard error but the error
+  bool is_network_open = false;        ///< true to permit rasters on servers
 
   void add(CLI::App* command);
 };

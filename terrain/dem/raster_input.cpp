@@ -3,6 +3,7 @@
 #include <cpl_conv.h>
 #include <cpl_string.h>
 #include <cpl_vsi.h>
+#include <cpl_vsi_error.h>
 #include <cpl_vsi_virtual.h>
 #include <fmt/ranges.h>
 
@@ -14,6 +15,7 @@
 #include <memory>
 #include <regex>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "core/io/memory.h"
@@ -29,7 +31,10 @@ namespace {
 constexpr std::array input_drivers{"GTiff",   "VRT",     "HFA",  "AAIGrid", "DTED", "PNG",
                                    "SRTMHGT", "USGSDEM", "EHdr", "ENVI",    "JPEG", "XYZ"};
 constexpr std::array local_systems{"/vsimem/", "/vsizip/", "/vsigzip/", "/vsitar/", "/vsisubfile/"};
+// Those that are open if the network is.
+constexpr std::array remote_systems{"/vsicurl/", "/vsis3/"};
 constexpr const char* more_drivers = "GROUNDRAY_RASTER_DRIVERS";
+constexpr const char* network = "GROUNDRAY_NETWORK";
 constexpr std::size_t most_name_bytes = 4096;
 constexpr double most_block_bytes = 1 << 30;
 
@@ -41,9 +46,54 @@ CPLStringList permitted_drivers() {
   return names;
 }
 
-bool is_local_system(std::string_view path) {
-  return std::ranges::any_of(local_systems,
-                             [&](const char* prefix) { return path.starts_with(prefix); });
+// Returns true if rasters may be read from servers, which the environment decides at the start.
+bool is_network_open() {
+  static const bool is_open = [] {
+    const char* given = std::getenv(network);
+    const std::string_view value = given == nullptr ? "" : given;
+    if (value == "1") return true;
+    if (value.empty() || value == "0") return false;
+    throw Error("the environment variable {} must be 1 (rasters are read from servers) or 0",
+                network);
+  }();
+  return is_open;
+}
+
+bool is_open_system(std::string_view path) {
+  const auto begins_path = [&](const char* prefix) { return path.starts_with(prefix); };
+  return std::ranges::any_of(local_systems, begins_path) ||
+         (is_network_open() && std::ranges::any_of(remote_systems, begins_path));
+}
+
+bool is_remote(const std::string& name) {
+  return is_network_open() && std::ranges::any_of(remote_systems, [&](const char* prefix) {
+           return name.find(prefix) != std::string::npos;
+         });
+}
+
+// Returns why a server does not give the file; empty if it gives its first byte.
+std::string answer_of_server(const std::string& file) {
+  VSICurlClearCache();  // it remembers that there is no file, but not why
+  VSIErrorReset();
+  CPLErrorReset();
+  const std::unique_ptr<VSILFILE, decltype(&VSIFCloseL)> open(VSIFOpenExL(file.c_str(), "rb", TRUE),
+                                                              &VSIFCloseL);
+  char first = 0;
+  if (open && VSIFReadL(&first, 1, 1, open.get()) == 1) return "";
+  std::string answer = *VSIGetLastErrorMsg() ? VSIGetLastErrorMsg() : CPLGetLastErrorMsg();
+  answer.resize(std::min({answer.find('\n'), answer.find(". Retrying"), answer.size()}));
+  return fmt::format("the server does not give it{}", answer.empty() ? "" : ": " + answer);
+}
+
+// Sets limits of time for servers, unless the environment sets others.
+void limit_waiting() {
+  constexpr std::array<std::pair<const char*, const char*>, 4> limits{
+      {{"GDAL_HTTP_CONNECTTIMEOUT", "10"},
+       {"GDAL_HTTP_TIMEOUT", "60"},
+       {"GDAL_HTTP_MAX_RETRY", "5"},
+       {"GDAL_HTTP_RETRY_DELAY", "1"}}};
+  for (const auto& [key, value] : limits)
+    if (CPLGetConfigOption(key, nullptr) == nullptr) CPLSetConfigOption(key, value);
 }
 
 void* refuse_file(void* /*user*/, const char* name, const char* /*access*/) {
@@ -61,7 +111,7 @@ void close_file_systems() {
   // GDAL forgets the handlers that it replaces. They may be in use, so they are kept until the end.
   static auto& replaced = *new std::vector<VSIFilesystemHandler*>;
   for (int i = 0; i < prefixes.size(); ++i) {
-    if (is_local_system(prefixes[i])) continue;
+    if (is_open_system(prefixes[i])) continue;
     replaced.push_back(VSIFileManager::GetHandler(prefixes[i]));
     VSIInstallPluginHandler(prefixes[i], refusal.get());
   }
@@ -202,12 +252,14 @@ std::string why_not_opened(const std::string& name) {
 }  // namespace
 
 void register_drivers() {
+  const bool is_network_wanted = is_network_open();  // throws before anything is registered
   GDALDriverManager& drivers = *GetGDALDriverManager();
   const bool is_first = drivers.GetDriverCount() == 0;
   CPLSetConfigOption("GDAL_SKIP", "");  // or those that are needed may be missing
   GDALAllRegister();
   CPLSetConfigOption("GDAL_VRT_ENABLE_PYTHON", "NO");
   CPLSetConfigOption("CPL_VSIL_GZIP_WRITE_PROPERTIES", "NO");  // a file beside the archive
+  if (is_network_wanted) limit_waiting();
   if (!is_first) return;
   remove_drivers(drivers);
   close_file_systems();
@@ -227,11 +279,16 @@ std::string checked_file(const std::string& name) {
   std::string file = name;
   if (std::regex_match(name, parts, subdataset)) file = parts[1].matched ? parts[1] : parts[2];
   for (std::sregex_iterator at(file.begin(), file.end(), system), end; at != end; ++at) {
-    if (is_local_system(at->str() + "/")) continue;
-    throw Error("{} is not read: rasters must be local files; download it first", at->str());
+    if (is_open_system(at->str() + "/")) continue;
+    if (std::ranges::find(remote_systems, at->str() + "/") == remote_systems.end())
+      throw Error("{} is not read: rasters must be local files; download it first", at->str());
+    throw Error(
+        "{} is not read: rasters must be local files, unless --network or {}=1 permits servers",
+        at->str(), network);
   }
   VSIStatBufL state;
   if (VSIStatExL(file.c_str(), &state, VSI_STAT_EXISTS_FLAG | VSI_STAT_NATURE_FLAG) != 0) {
+    if (is_remote(file)) throw Error("{}", answer_of_server(file));
     throw Error("{}", file.starts_with("/vsi") ? "there is no such file" : why_no_file(file));
   }
   if (!VSI_ISREG(state.st_mode)) {
@@ -245,6 +302,8 @@ std::string checked_driver(const std::string& name) {
   const CPLStringList drivers = permitted_drivers();
   GDALDriverH driver = GDALIdentifyDriverEx(name.c_str(), GDAL_OF_RASTER, drivers.List(), nullptr);
   if (driver != nullptr) return GDALGetDriverShortName(driver);
+  if (const std::string why = is_remote(name) ? answer_of_server(name) : ""; !why.empty())
+    throw Error("{}", why);
   const std::string ending = std::filesystem::path(name).extension().string();
   for (const char* other : {".ply", ".pcd", ".las", ".laz", ".npy", ".npz", ".bin", ".e57", ".obj",
                             ".stl", ".glb", ".gltf"}) {
