@@ -22,7 +22,7 @@ sys.exit(code)
 
 
 def test_the_time_that_it_adds_is_small_for_shards_of_a_minute(tmp_path, capsys):
-    """Of processors, with groundray --version, for a shard in a process of its own."""
+    """CPU time, including `groundray --version`, of a shard in a process of its own."""
     scene, whole = single_run()
     program = tmp_path / "version"
     program.write_text(f'#!/bin/sh\n[ $1 = --version ] && exec {PROGRAM} "$@"\nexit 3\n')

@@ -288,7 +288,7 @@ def test_status_counts_shards_and_shows_the_end_of_logs(store, tmp_path, capsys)
     assert cluster("status", url) == 0
     told = capsys.readouterr().out
     assert re.search(
-        r"shard 4 is running, heard \d s ago: attempt, .* on rock, process 7: beg", told
+        r"shard 4 is running, last heard from \d s ago: attempt, .* on rock, process 7: beg", told
     )
     assert "shard 5 failed in 1 attempts; the end of its log:\n" in told
     assert "    groundray: disk full\n" in told

@@ -33,7 +33,12 @@ def table(folder, text):
 
 def test_a_sweep_makes_a_dataset_for_each_row_that_is_reproducible_alone(folder, capsys):
     store = folder / "store"
-    given = ["sweep", table(folder, TABLE.replace("[7, 8]", "[8]")), "--store", store.as_uri()]
+    given = [
+        "sweep",
+        table(folder, TABLE.replace("[7, 8]", "[8]")),
+        "--store",
+        f"{store.as_uri()}/",
+    ]
     given += ["--groundray", PROGRAM, "--workers", 2]
     assert cluster(*given) == 0
     out = capsys.readouterr().out

@@ -65,7 +65,7 @@ def _parser() -> argparse.ArgumentParser:
         ("status", "Show how far a run is, its rate, and the logs of failed shards."),
         ("verify", "Read all files of a merged dataset and compare their checksums."),
     ):
-        command(name, text).add_argument("store", metavar="STORE", help="as of run --store")
+        command(name, text).add_argument("store", metavar="STORE", help="as for run --store")
     return parser
 
 
@@ -81,7 +81,8 @@ def _add_attempts(parser: argparse.ArgumentParser) -> None:
     add("--retries", type=_whole, default=2, metavar="R", help=text)
     text = "folder for the files of shards under way (default: that of temporary files)"
     add("--scratch", type=Path, default=Path(tempfile.gettempdir()), metavar="FOLDER", help=text)
-    add("--groundray", default="groundray", metavar="PROGRAM", help="program that makes frames")
+    text = "program that makes frames (default: that of the Python package, or else of the PATH)"
+    add("--groundray", default="groundray", metavar="PROGRAM", help=text)
     text = "threads of each groundray (default: all cores, divided among local workers)"
     add("--threads", type=_positive, metavar="T", help=text)
 
@@ -177,24 +178,29 @@ def _run(options: argparse.Namespace, tasks: Sequence[Task]) -> str:
         raise Error(
             f"{len(failed)} shards failed, {count} of {total} are done: {failed[0].message}"
         )
-    told = [f"{task.store}: {merged.merge(Store(task.store))}" for task in tasks]
-    return "\n".join(told)
+    lines = [f"{task.store}: {merged.merge(Store(task.store))}" for task in tasks]
+    return "\n".join(lines)
 
 
 def _submit(options: argparse.Namespace, jobs: Sequence[Job]) -> str:
-    told = []
+    lines = []
     for store in dict.fromkeys(job.task.store for job in jobs):
         mine = [job for job in jobs if job.task.store == store]
         script = slurm_script(mine, options.retries, options.sbatch or [])
-        told.append(script.rstrip() if options.print_script else submit_slurm(script))
-    return "\n".join(told) or "all shards are done; merge them with groundray-cluster merge"
+        lines.append(script.rstrip() if options.print_script else submit_slurm(script))
+    return "\n".join(lines) or "all shards are done; merge them with groundray-cluster merge"
 
 
 def _sweep(options: argparse.Namespace) -> str:
     sweep = read_sweep(options.params)
     tasks = []
     for run in sweep.runs:
-        task = _task(options, write_scene(sweep, run), f"{options.store}/{run.name}", sweep.shards)
+        task = _task(
+            options,
+            write_scene(sweep, run),
+            f"{options.store.rstrip('/')}/{run.name}",
+            sweep.shards,
+        )
         store = Store(task.store)
         task.identity().claim(store)
         store.put_once(SCENE, run.scene)
@@ -226,8 +232,8 @@ def _work(options: argparse.Namespace) -> tuple[int, str]:
         return DONE, f"{store.url}: {merged.merge(store)}"
     if options.command == "status":
         return DONE, f"{store.url}: {merged.status(store, print)}"
-    faults, told = merged.verify(store, print)
-    return FAILED if faults else DONE, f"{store.url}: {told}"
+    faults, message = merged.verify(store, print)
+    return FAILED if faults else DONE, f"{store.url}: {message}"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -237,17 +243,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     _check_options(parser, options)
     before = signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
-        code, told = _work(options)
-        print(told)
+        code, message = _work(options)
+        print(message)
         return code
     except KeyboardInterrupt:
-        code, told = INTERRUPTED, "interrupted; the same command continues"
+        code, message = INTERRUPTED, "interrupted; the same command continues"
     except Error as fault:
-        code, told = FAILED, str(fault)
+        code, message = FAILED, str(fault)
     except OSError as fault:
         place = f"{fault.filename}: " if fault.filename else ""
-        code, told = FAILED, f"{place}{fault.strerror or fault}"
+        code, message = FAILED, f"{place}{fault.strerror or fault}"
     finally:
         signal.signal(signal.SIGTERM, before)
-    print(f"groundray-cluster: {told}", file=sys.stderr)
+    print(f"groundray-cluster: {message}", file=sys.stderr)
     return code

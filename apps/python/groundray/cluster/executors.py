@@ -75,7 +75,7 @@ def run_dask(address: str, jobs: Sequence[Job], retries: int) -> Iterator[Outcom
         raise Error("Dask is not installed: pip install 'dask[distributed]'")
     dask: Any = importlib.import_module("distributed")
     for name in ("distributed", "distributed.client"):
-        logging.getLogger(name).setLevel(logging.CRITICAL)  # faults are told here, in one line
+        logging.getLogger(name).setLevel(logging.CRITICAL)  # faults are reported here, in one line
     try:
         client = dask.Client(address)
     except (OSError, ValueError) as fault:

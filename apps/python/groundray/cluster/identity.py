@@ -26,7 +26,7 @@ def log_of(shard: int) -> str:
 
 @dataclass(frozen=True)
 class Identity:
-    """What the bytes of a run's objects depend on, with the files that the scene names.
+    """Inputs that determine the bytes of a run's objects, besides the files that the scene names.
 
     Those are compared by their fingerprint in `common.yaml`. Processors and C libraries need no
     comparison: elementary functions have the same bits on all (core/math.h).
@@ -76,6 +76,11 @@ class Task:
     scratch: str
     threads: int | None
 
+    def program_here(self) -> str:
+        """Returns the program on this machine: by default that of the package, if it has one."""
+        own = Path(__file__).parents[1] / "bin/groundray"
+        return str(own) if self.program == "groundray" and own.is_file() else self.program
+
     def identity(self) -> Identity:
         """Reads the scene and asks the program, on this machine."""
         try:
@@ -91,7 +96,7 @@ class Task:
     def _version(self) -> str:
         try:
             asked = subprocess.run(
-                [self.program, "--version"], capture_output=True, text=True, check=True
+                [self.program_here(), "--version"], capture_output=True, text=True, check=True
             )
         except (OSError, subprocess.CalledProcessError) as fault:
             raise FinalError(f"{self.program}: {fault}; name the program by --groundray") from None

@@ -133,7 +133,7 @@ def _time(seconds: float) -> str:
 
 
 def status(store: Store, tell: Tell) -> str:
-    """Tells of shards that run or failed; returns a summary with the rate and the time left."""
+    """Reports running and failed shards; returns a summary with the rate and the time left."""
     run = recorded(store)
     objects = {each.key: each for each in store.list("shards")}
     shards = range(1, run.shards + 1)
@@ -166,4 +166,4 @@ def status(store: Store, tell: Tell) -> str:
 def _heard(log: Object) -> str:
     silent_s = (datetime.now(UTC) - log.time).total_seconds()
     is_lost = silent_s > 3 * HEARTBEAT_S
-    return f"is {'perhaps lost' if is_lost else 'running'}, heard {_time(silent_s)} ago"
+    return f"is {'perhaps lost' if is_lost else 'running'}, last heard from {_time(silent_s)} ago"

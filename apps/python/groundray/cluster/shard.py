@@ -14,8 +14,9 @@ import threading
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 
 from groundray.cluster.identity import COMMON, Task, log_of, marker_of
@@ -45,7 +46,7 @@ def make_shard(task: Task, shard: int, stop: threading.Event | None = None) -> s
         return "there"
     log = _Log(store, shard)
     try:
-        with _scratch_folder(Path(task.scratch)) as folder:
+        with _scratch_folder(Path(task.scratch)) as folder, _faults_of(task.scratch):
             _generate(task, shard, folder, log, stop or threading.Event())
             _upload(store, shard, folder / "out")
     except BaseException as fault:
@@ -87,11 +88,20 @@ class _Log:
 
 
 @contextmanager
-def _locked(folder: Path, how: int) -> Iterator[int]:
+def _faults_of(scratch: str) -> Iterator[None]:
+    """Raises Error for faults of the system, such as a full disk, to have attempts repeated."""
+    try:
+        yield
+    except OSError as fault:
+        raise Error(f"{fault.filename or scratch}: {fault.strerror or fault}") from None
+
+
+@contextmanager
+def _locked(folder: Path, how: int) -> Iterator[None]:
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
         fcntl.flock(descriptor, how)
-        yield descriptor
+        yield
     finally:
         os.close(descriptor)
 
@@ -102,33 +112,31 @@ def _scratch_folder(root: Path) -> Iterator[Path]:
 
     It is locked meanwhile, so that those of attempts that were killed are known, and removed.
     """
-    prefix = f"groundray-cluster-{platform.node()}-"
-    try:
-        with _locked(root, fcntl.LOCK_EX):
-            for other in root.glob(f"{prefix}*"):
-                try:
-                    with _locked(other, fcntl.LOCK_EX | fcntl.LOCK_NB):
-                        shutil.rmtree(other, ignore_errors=True)
-                except OSError:
-                    continue  # it is in use
-            folder = Path(tempfile.mkdtemp(prefix=prefix, dir=root))
-            descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-            fcntl.flock(descriptor, fcntl.LOCK_EX)
-    except OSError as fault:
-        raise Error(f"{root}: {fault.strerror}; choose another folder by --scratch") from None
-    try:
+    prefix = f"groundray-cluster-{platform.node()}-{os.getuid()}-"
+    for other in root.glob(f"{prefix}*"):
+        with suppress(OSError), _locked(other, fcntl.LOCK_EX | fcntl.LOCK_NB):  # unless in use
+            shutil.rmtree(other, ignore_errors=True)
+    with ExitStack() as held:
+        try:
+            folder = None
+            while folder is None or not folder.exists():  # if not, another attempt has removed it
+                folder = Path(tempfile.mkdtemp(prefix=prefix, dir=root))
+                with suppress(FileNotFoundError):
+                    held.enter_context(_locked(folder, fcntl.LOCK_EX))
+            held.callback(shutil.rmtree, folder, ignore_errors=True)
+        except OSError as fault:
+            raise Error(f"{root}: {fault.strerror}; choose another folder by --scratch") from None
         yield folder
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
-        os.close(descriptor)
 
 
-def _die_with_parent() -> None:
+def _die_with(parent: int) -> None:
     _LIBC.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    if os.getppid() != parent:  # it has died before
+        os._exit(1)
 
 
 def _generate(task: Task, shard: int, folder: Path, log: _Log, stop: threading.Event) -> None:
-    command = [task.program, "generate", task.scene, "-o", str(folder / "out")]
+    command = [task.program_here(), "generate", task.scene, "-o", str(folder / "out")]
     command += ["--shard", f"{shard}/{task.shards}"]
     command += ["--seed", str(task.seed)] if task.seed is not None else []
     command += ["--threads", str(task.threads)] if task.threads is not None else []
@@ -139,16 +147,16 @@ def _generate(task: Task, shard: int, folder: Path, log: _Log, stop: threading.E
             stdin=subprocess.DEVNULL,
             stdout=file,
             stderr=subprocess.STDOUT,
-            preexec_fn=_die_with_parent,
+            preexec_fn=partial(_die_with, os.getpid()),
         )
-    told_s = time.monotonic()
+    reported_s = time.monotonic()
     try:
         while child.poll() is None:
             if stop.wait(0.1):
                 raise KeyboardInterrupt
-            if time.monotonic() - told_s > HEARTBEAT_S:
+            if time.monotonic() - reported_s > HEARTBEAT_S:
                 log.put(output)
-                told_s = time.monotonic()
+                reported_s = time.monotonic()
     finally:
         child.kill()
         child.wait()
@@ -158,7 +166,8 @@ def _generate(task: Task, shard: int, folder: Path, log: _Log, stop: threading.E
     said = read_bytes(output).decode(errors="replace").rpartition("groundray: ")[2]
     why = " ".join(said.split())[:_MOST_REASON]
     if child.returncode < 0:
-        why = f"groundray was ended by {signal.Signals(-child.returncode).name}"
+        names = {each.value: each.name for each in signal.Signals}
+        why = f"groundray was ended by {names.get(-child.returncode, -child.returncode)}"
     raise (FinalError if child.returncode == 2 else Error)(why)
 
 

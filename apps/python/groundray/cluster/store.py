@@ -27,7 +27,7 @@ _RETRIES: Any = {  # of requests that fail by 5xx, a timeout or a lost connectio
         "base": 2,
     },
 }
-# What the server rejects, or a missing bucket: in vain to repeat.
+# What the server rejects, or a missing bucket: not worth repeating.
 _REJECTED = re.compile(r"NoSuchBucket|status code: [34]\d\d")
 
 
@@ -78,7 +78,7 @@ class Store:
         folder = _folder(self.url)
         if folder and not folder.is_dir():
             raise FinalError(f"{self.url}: there is no such folder; correct the store")
-        with self._told():
+        with self._one_line_errors():
             if folder:
                 self._store: Any = from_url(self.url)
             else:
@@ -87,7 +87,7 @@ class Store:
                 self._store = from_url(self.url, client_options=options, retry_config=_RETRIES)
 
     @contextmanager
-    def _told(self) -> Iterator[None]:
+    def _one_line_errors(self) -> Iterator[None]:
         """Turns exceptions of the client into an Error of one line."""
         from obstore import exceptions
 
@@ -109,7 +109,7 @@ class Store:
 
         begin_s = time.monotonic()
         while True:
-            with self._told():
+            with self._one_line_errors():
                 try:
                     obstore.put(self._store, key, data, mode="create")
                     return True
@@ -136,14 +136,14 @@ class Store:
         """Writes an object, instead of any that is there."""
         import obstore
 
-        with self._told():
+        with self._one_line_errors():
             obstore.put(self._store, key, data)
 
     def blocks(self, key: str) -> Iterator[bytes]:
         """Reads an object piece by piece. Raises FileNotFoundError if there is none."""
         import obstore
 
-        with self._told():
+        with self._one_line_errors():
             for block in obstore.get(self._store, key).stream(min_chunk_size=1 << 20):
                 yield bytes(block)
 
@@ -152,7 +152,7 @@ class Store:
         import obstore
 
         try:
-            with self._told():
+            with self._one_line_errors():
                 obstore.head(self._store, key)
             return True
         except FileNotFoundError:
@@ -189,7 +189,7 @@ class Store:
         """Lists all objects, or those below a prefix."""
         import obstore
 
-        with self._told():
+        with self._one_line_errors():
             for batch in obstore.list(self._store, prefix):
                 for each in batch:
                     yield Object(each["path"], each["last_modified"])

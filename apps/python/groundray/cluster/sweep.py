@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import itertools
+import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
@@ -131,9 +132,9 @@ def read_sweep(path: Path) -> Sweep:
                 varied = _changed(varied, key.split("."), value)
             except KeyError as fault:
                 raise Error(f"{path}: {place}.{key}: {scene} has no {fault.args[0]}") from None
-        told = " ".join(f"{key}={_text(value)}" for key, value in parameters.items())
+        shown = " ".join(f"{key}={_text(value)}" for key, value in parameters.items())
         text = yaml.serialize(varied, allow_unicode=True, width=1 << 30).encode()
-        runs.append(Run(f"{len(runs) + 1:04}", text, told))
+        runs.append(Run(f"{len(runs) + 1:04}", text, shown))
     return Sweep(scene, int(shards), runs)
 
 
@@ -141,9 +142,12 @@ def write_scene(sweep: Sweep, run: Run) -> Path:
     """Writes the scene of a run beside that which it varies, so that its paths hold."""
     file = sweep.scene.with_name(f"{sweep.scene.stem}.{run.name}{sweep.scene.suffix}")
     try:
-        if file.exists() and read_bytes(file) != run.scene:
+        if not file.exists():
+            part = file.with_name(f".{file.name}.{os.getpid()}.part")
+            part.write_bytes(run.scene)
+            part.replace(file)
+        elif read_bytes(file) != run.scene:
             raise Error(f"{file}: another file of this name exists; remove it, or move the scene")
-        file.write_bytes(run.scene)
     except OSError as fault:
         raise Error(f"{file}: {fault.strerror}; a sweep writes its scenes here") from None
     return file
