@@ -19,8 +19,8 @@
 #include "apps/golden/suite/suite.h"
 #include "apps/scan/usage_fault.h"
 #include "apps/scene/interruption.h"
-#include "apps/scene/simulation.h"
 #include "core/error.h"
+#include "core/io/own_folder.h"
 #include "core/io/print_error.h"
 #include "core/near_names.h"
 
@@ -33,7 +33,7 @@ constexpr int done = 0;
 constexpr int failed = 1;
 constexpr int interrupted = 130;
 
-fs::path own_folder() {
+fs::path program_folder() {
   std::error_code ignored;
   return fs::read_symlink("/proc/self/exe", ignored).parent_path();
 }
@@ -105,8 +105,8 @@ int run(int argc, char** argv) {
   app.set_version_flag("--version", "groundray-golden " GROUNDRAY_VERSION);
   app.require_subcommand(1);
 
-  fs::path folder = source_folder() / "test/golden";
-  SuiteOptions options{.program = own_folder() / "groundray",
+  fs::path folder = own_folder() / "test/golden";
+  SuiteOptions options{.program = program_folder() / "groundray",
                        .out = "out/golden",
                        .jobs = std::max(1U, std::thread::hardware_concurrency())};
   const auto add_options = [&](CLI::App* command) {

@@ -1,6 +1,5 @@
 #include "apps/scene/simulation.h"
 
-#include <dlfcn.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -21,6 +20,7 @@
 #include "core/error.h"
 #include "core/image/image_io.h"
 #include "core/io/memory.h"
+#include "core/io/own_folder.h"
 #include "sensors/camera/imager.h"
 #include "sensors/camera/lens/stereo.h"
 #include "sensors/lidar/pattern/scan_pattern.h"
@@ -263,14 +263,6 @@ std::optional<Sky> load_sky(const SceneSpec& spec) {
   return Sky(*spec.sky, environment != nullptr ? read_image_f(environment->image) : ImageF());
 }
 
-// Returns the program or shared library that contains this code: the Python module has its data
-// next to it.
-std::filesystem::path own_file() {
-  Dl_info info{};
-  static const char here = 0;
-  return dladdr(&here, &info) != 0 && info.dli_fname != nullptr ? info.dli_fname : "";
-}
-
 // Returns true if two scenes that differ as edited_simulation permits scatter the same objects.
 bool has_same_placements(const SceneSpec& a, const SceneSpec& b) {
   if (a.scatter.empty()) return true;
@@ -353,12 +345,7 @@ Exposed first_frame(const Simulation& simulation) {
 
 std::filesystem::path data_folder() {
   if (const char* chosen = std::getenv("GROUNDRAY_DATA")) return chosen;
-  std::error_code ignored;
-  const auto program = std::filesystem::read_symlink("/proc/self/exe", ignored);
-  for (const auto& folder :
-       {own_file().parent_path() / "data", program.parent_path().parent_path() / "share/groundray"})
-    if (std::filesystem::exists(folder / "sensors", ignored)) return folder;
-  return source_folder() / "data";
+  return own_folder() / "data";
 }
 
 Simulation load_simulation(const std::filesystem::path& scene, std::optional<Seed> seed) {

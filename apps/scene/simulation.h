@@ -127,13 +127,8 @@ SensorBox sensor_box(const Exposed& frame);
 /// Returns the first frame of a run: the first lidar's, or else the first camera's.
 Exposed first_frame(const Simulation& simulation);
 
-/// Returns the folder with groundray's own data: $GROUNDRAY_DATA, or the one next to the installed
-/// program or Python module, or that of the source tree.
+/// Returns the folder with groundray's own data: $GROUNDRAY_DATA, or that in own_folder().
 std::filesystem::path data_folder();
-
-/// Returns the source folder from which the program was built, where a program that is not
-/// installed finds data/ and test/.
-std::filesystem::path source_folder();
 
 /// Loads a scene and all files that it names.
 /// @param seed  replaces the scene's own.

@@ -3,6 +3,7 @@
 #include <cpl_conv.h>
 #include <cpl_string.h>
 #include <fmt/ranges.h>
+#include <ogr_srs_api.h>
 #include <tiffio.h>
 
 #include <algorithm>
@@ -17,6 +18,7 @@
 #include <string_view>
 #include <system_error>
 
+#include "core/io/own_folder.h"
 #include "terrain/dem/raster_input.h"
 
 namespace groundray {
@@ -144,12 +146,25 @@ void refuse_infinite(const Strip& strip) {
               *infinite);
 }
 
+// Has GDAL and PROJ read their own files where a package holds them: PROJ reads no database of
+// another version.
+void use_packed_files() {
+  const std::filesystem::path gdal = own_folder() / "gdal";
+  const std::filesystem::path proj = own_folder() / "proj";
+  if (std::filesystem::exists(gdal)) CPLSetConfigOption("GDAL_DATA", gdal.c_str());
+  if (!std::filesystem::exists(proj / "proj.db")) return;
+  CPLStringList folders(OSRGetPROJSearchPaths(), TRUE);  // with grids that the user has added
+  folders.InsertString(0, proj.c_str());
+  OSRSetPROJSearchPaths(folders.List());
+}
+
 }  // namespace
 
 void start_gdal() {
   // GDAL's registration is not thread-safe.
   static std::once_flag once;
   std::call_once(once, [] {
+    use_packed_files();
     register_drivers();
     // The handlers that GDAL up to 3.6 sets. Later versions keep libtiff's own, which only print,
     // so that an error on closing a file, such as a full disk, would go unnoticed.

@@ -3,11 +3,13 @@
 import json
 import math
 import re
+import shutil
+import subprocess
 
 import numpy as np
 import pytest
 import yaml
-from dataset_runs import ROOT, groundray
+from dataset_runs import PROGRAM, ROOT, groundray
 
 PRESETS = sorted((ROOT / "data/sensors").glob("*.yaml"))
 MATERIALS = sorted((ROOT / "data/materials").glob("*.yaml"))
@@ -137,6 +139,32 @@ def test_info_prefers_a_file_to_a_preset_of_its_name(tmp_path):
     result = groundray("info", "rock", cwd=tmp_path)
     assert result.returncode == 1
     assert "cannot be opened as a raster" in result.stderr
+
+
+def test_data_in_the_working_folder_are_not_taken_for_groundrays_own(tmp_path):
+    (tmp_path / "data/sensors").mkdir(parents=True)
+    (tmp_path / "data/sensors/alien.yaml").write_text("not: groundray's\n")
+    done = subprocess.run(
+        ["groundray", "list", "lidars"],  # a relative name, as a shell gives it
+        executable=PROGRAM,
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert "velodyne_vlp16" in done.stdout
+    assert "alien" not in done.stdout
+
+
+def test_data_beside_a_users_folder_bin_are_not_taken_for_groundrays_own(tmp_path):
+    for folder in ("project/bin", "project/data/sensors"):
+        (tmp_path / folder).mkdir(parents=True)
+    (tmp_path / "project/data/sensors/alien.yaml").write_text("not: groundray's\n")
+    program = tmp_path / "project/bin/groundray"
+    shutil.copy(PROGRAM, program)
+    done = subprocess.run([program, "list", "lidars"], capture_output=True, text=True, check=True)
+    assert "velodyne_vlp16" in done.stdout
+    assert "alien" not in done.stdout
 
 
 def test_presets_of_another_data_folder_are_listed(tmp_path):

@@ -34,7 +34,7 @@ foreach(index RANGE 1 2)
   run(${CMAKE_COMMAND} --build ${folder}/build)
 endforeach()
 
-set(data ${SCRATCH}/prefix/share/groundray)
+set(data ${SCRATCH}/prefix/share/groundray/data)
 function(read_count file variable)  # the number of points in a PLY file
   file(STRINGS ${file} line REGEX "^element vertex [0-9]+$" LIMIT_COUNT 1)
   string(REPLACE "element vertex " "" line "${line}")

@@ -188,7 +188,7 @@ def test_within_m_is_rejected_for_anything_but_meshes(tmp_path):
 def test_data_beside_the_module_takes_precedence_over_the_prefix(tmp_path):
     # A Python whose prefix has a share/groundray of somebody else, with another preset of the name.
     program = tmp_path / "stranger/bin/python"
-    foreign = tmp_path / "stranger/share/groundray/sensors"
+    foreign = tmp_path / "stranger/share/groundray/data/sensors"
     own = tmp_path / "site/groundray"
     for folder in (program.parent, foreign):
         folder.mkdir(parents=True)

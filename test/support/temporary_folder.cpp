@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "apps/scene/simulation.h"
+#include "core/io/own_folder.h"
 
 namespace groundray::testing {
 

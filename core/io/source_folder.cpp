@@ -1,4 +1,4 @@
-#include "apps/scene/simulation.h"
+#include "core/io/own_folder.h"
 
 namespace groundray {
 
