@@ -9,7 +9,7 @@ install() {
 }
 
 if [[ $1 == packages ]]; then
-  install ./groundray_*.deb ./groundray-view_*.deb
+  install --reinstall ./groundray_*.deb ./groundray-view_*.deb  # of the same version, if this system has been used before
   bin=/usr/bin data=/usr/share/groundray/data
 else
   install zstd libgl1 libegl1 libopengl0 libx11-6 libx11-xcb1 libxcb1 libxext6 libxrender1 libsm6 libice6 libglib2.0-0
@@ -32,7 +32,7 @@ timeout 20 xvfb-run -a "$bin/groundray-view" "$data/scenes/first_light.yaml" 2>o
 if grep -i opengl out/window.log; then exit 1; fi
 
 [[ $1 == packages ]] || exit 0
-install ./libgroundray-dev_*.deb g++ cmake ninja-build
+install --reinstall ./libgroundray-dev_*.deb g++ cmake ninja-build
 cmake -G Ninja -S consumer -B out/consumer -DCMAKE_BUILD_TYPE=Release >/dev/null
 cmake --build out/consumer
 points=$(sed -n 's/^element vertex //p;/^end_header/q' out/first_light/lidar/top/000000.ply)

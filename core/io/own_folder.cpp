@@ -9,14 +9,15 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Returns the folder of the shared library that contains this code; nothing in a program, whose
-// name, as given to it, may be relative.
+// Returns the folder of the shared library that contains this code; empty if a program does.
 fs::path module_folder() {
   Dl_info info{};
   static const char here = 0;
-  const bool is_found = dladdr(&here, &info) != 0 && info.dli_fname != nullptr;
-  const fs::path file = is_found ? info.dli_fname : "";
-  return file.is_absolute() ? file.parent_path() : fs::path();
+  if (dladdr(&here, &info) == 0 || info.dli_fname == nullptr) return {};
+  std::error_code ignored;
+  const fs::path file = info.dli_fname;  // of a program, it is the name that it was started by
+  if (!file.is_absolute() || fs::equivalent(file, "/proc/self/exe", ignored)) return {};
+  return file.parent_path();
 }
 
 }  // namespace

@@ -167,6 +167,26 @@ def test_data_beside_a_users_folder_bin_are_not_taken_for_groundrays_own(tmp_pat
     assert "alien" not in done.stdout
 
 
+@pytest.mark.parametrize("name", ["groundray", "prefix/bin/groundray", "absolute"])
+def test_an_installed_program_finds_its_data_by_whatever_name_it_is_started(name, tmp_path):
+    for folder in ("prefix/bin", "prefix/share/groundray/data/sensors"):
+        (tmp_path / folder).mkdir(parents=True)
+    preset = tmp_path / "prefix/share/groundray/data/sensors/installed.yaml"
+    shutil.copy(ROOT / "data/sensors/velodyne_vlp16.yaml", preset)
+    program = tmp_path / "prefix/bin/groundray"
+    shutil.copy(PROGRAM, program)
+    done = subprocess.run(
+        [str(program) if name == "absolute" else name, "list", "lidars"],
+        executable=program,
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert "installed" in done.stdout
+    assert "velodyne_vlp16" not in done.stdout
+
+
 def test_presets_of_another_data_folder_are_listed(tmp_path):
     for folder in ("sensors", "materials"):
         (tmp_path / folder).mkdir()

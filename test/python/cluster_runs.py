@@ -2,6 +2,7 @@
 
 import functools
 import os
+import signal
 import subprocess
 import sys
 import tempfile
@@ -96,7 +97,7 @@ def cluster(*given):
 
 
 def started(*given):
-    """Starts the command as a process."""
+    """Starts the command as a process that Ctrl-C reaches, even if this one ignores it."""
     return subprocess.Popen(
         [sys.executable, "-P", "-m", "groundray.cluster", *map(str, given)],
         env={**os.environ, "PYTHONPATH": str(PACKAGE)},
@@ -104,6 +105,7 @@ def started(*given):
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
+        preexec_fn=functools.partial(signal.signal, signal.SIGINT, signal.SIG_DFL),
     )
 
 

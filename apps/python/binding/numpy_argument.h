@@ -155,7 +155,8 @@ struct type_caster<groundray::python::NumpyArgument<Array>> {
       std::string why;  // of its own, not of NumPy about values that are no numbers
       if (hasattr(source, "__array__")) why = groundray::python::text_of(error.value());
       if (!why.empty()) why.insert(0, ": ");
-      value = Argument(misfit(fmt::format("a {}{}", Py_TYPE(source.ptr())->tp_name, why)));
+      const std::string type = cast<std::string>(source.type().attr("__name__"));
+      value = Argument(misfit(fmt::format("a {}{}", type, why)));
     }
     return true;
   }
