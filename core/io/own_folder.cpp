@@ -28,9 +28,9 @@ fs::path own_folder() {
     return fs::exists(folder / "data/sensors", ignored);
   };
   // A wheel has the module as groundray/_core*.so, and the programs in groundray/bin.
-  const fs::path beside_module = module_folder();
+  fs::path beside_module = module_folder();
   if (!beside_module.empty()) return has_data(beside_module) ? beside_module : source_folder();
-  const fs::path prefix = fs::read_symlink("/proc/self/exe", ignored).parent_path().parent_path();
+  fs::path prefix = fs::read_symlink("/proc/self/exe", ignored).parent_path().parent_path();
   if (fs::exists(prefix / "__init__.py", ignored) && has_data(prefix)) return prefix;
   const fs::path shared = prefix / "share/groundray";
   return has_data(shared) ? shared : source_folder();
