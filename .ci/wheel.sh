@@ -1,5 +1,5 @@
 # Wheels of the Python package with the programs; sourced by dev. They are built on Debian 12, whose C library is the oldest
-# that has what groundray uses: Debian 12, Ubuntu 22.04 and Fedora 36 and later run them.
+# that has what groundray uses: systems with glibc 2.35 or later run them.
 
 packing_packages=(dpkg-dev file zstd libproj-dev libgeotiff-dev libcurl4-openssl-dev libjson-c-dev libdeflate-dev liblzma-dev
   libzstd-dev libqhull-dev libdraco-dev libutfcpp-dev libminizip-dev)
@@ -25,7 +25,7 @@ slim() {
 }
 
 # GDAL with no drivers but those of DEMs and photos (docs/reference/trust.md), and assimp with no readers but those that
-# core/model uses. Programs load them instead of Debian's, which would add 75 libraries and 114 MiB, and 8 MiB.
+# core/model uses. Programs load them instead of Debian's, which would add 57 libraries and 104 MiB, and 7 MiB.
 slim_libraries() {
   local part settings=()
   mkdir -p build/wheel/slim/lib

@@ -141,19 +141,25 @@ def test_info_prefers_a_file_to_a_preset_of_its_name(tmp_path):
     assert "cannot be opened as a raster" in result.stderr
 
 
-def test_data_in_the_working_folder_are_not_taken_for_groundrays_own(tmp_path):
-    (tmp_path / "data/sensors").mkdir(parents=True)
-    (tmp_path / "data/sensors/alien.yaml").write_text("not: groundray's\n")
+def lidars_of(program, name, folder):
+    """Returns the lidars that a program lists if it is started in a folder by a name."""
     done = subprocess.run(
-        ["groundray", "list", "lidars"],  # a relative name, as a shell gives it
-        executable=PROGRAM,
-        cwd=tmp_path,
+        [name, "list", "lidars"],
+        executable=program,
+        cwd=folder,
         capture_output=True,
         text=True,
         check=True,
     )
-    assert "velodyne_vlp16" in done.stdout
-    assert "alien" not in done.stdout
+    return done.stdout
+
+
+def test_data_in_the_working_folder_are_not_taken_for_groundrays_own(tmp_path):
+    (tmp_path / "data/sensors").mkdir(parents=True)
+    (tmp_path / "data/sensors/alien.yaml").write_text("not: groundray's\n")
+    lidars = lidars_of(PROGRAM, "groundray", tmp_path)  # a relative name, as a shell gives it
+    assert "velodyne_vlp16" in lidars
+    assert "alien" not in lidars
 
 
 def test_data_beside_a_users_folder_bin_are_not_taken_for_groundrays_own(tmp_path):
@@ -162,9 +168,9 @@ def test_data_beside_a_users_folder_bin_are_not_taken_for_groundrays_own(tmp_pat
     (tmp_path / "project/data/sensors/alien.yaml").write_text("not: groundray's\n")
     program = tmp_path / "project/bin/groundray"
     shutil.copy(PROGRAM, program)
-    done = subprocess.run([program, "list", "lidars"], capture_output=True, text=True, check=True)
-    assert "velodyne_vlp16" in done.stdout
-    assert "alien" not in done.stdout
+    lidars = lidars_of(program, str(program), tmp_path)
+    assert "velodyne_vlp16" in lidars
+    assert "alien" not in lidars
 
 
 @pytest.mark.parametrize("name", ["groundray", "prefix/bin/groundray", "absolute"])
@@ -175,16 +181,9 @@ def test_an_installed_program_finds_its_data_by_whatever_name_it_is_started(name
     shutil.copy(ROOT / "data/sensors/velodyne_vlp16.yaml", preset)
     program = tmp_path / "prefix/bin/groundray"
     shutil.copy(PROGRAM, program)
-    done = subprocess.run(
-        [str(program) if name == "absolute" else name, "list", "lidars"],
-        executable=program,
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert "installed" in done.stdout
-    assert "velodyne_vlp16" not in done.stdout
+    lidars = lidars_of(program, str(program) if name == "absolute" else name, tmp_path)
+    assert "installed" in lidars
+    assert "velodyne_vlp16" not in lidars
 
 
 def test_presets_of_another_data_folder_are_listed(tmp_path):

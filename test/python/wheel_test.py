@@ -177,6 +177,27 @@ def test_the_installed_program_runs(installed):
     assert module == reported
 
 
+def test_a_script_runs_the_program_of_its_name_in_the_package(tmp_path):
+    for folder in ("bin", "site/groundray/bin"):
+        (tmp_path / folder).mkdir(parents=True)
+    script = tmp_path / "bin/groundray"
+    shutil.copy(ROOT / "apps/python/run_program.py", script)
+    bare = subprocess.run([sys.executable, "-S", script], capture_output=True, text=True, env={})
+    assert bare.returncode == 1
+    assert "has no package groundray: pip install groundray" in bare.stderr
+    (tmp_path / "site/groundray/__init__.py").write_text("raise ImportError('it is not imported')")
+    program = tmp_path / "site/groundray/bin/groundray"
+    program.write_text('#!/bin/sh\necho "$GROUNDRAY_PYTHON|$1|$2"\nexit 3\n')
+    program.chmod(0o755)
+    done = subprocess.run(
+        [sys.executable, script, "a b", "c"],
+        capture_output=True,
+        text=True,
+        env={"PYTHONPATH": str(tmp_path / "site")},
+    )
+    assert (done.returncode, done.stdout) == (3, f"{sys.executable}|a b|c\n"), done.stderr
+
+
 def test_pip_and_the_tests_use_the_same_build_tools():
     """Otherwise the wheel would be built by other versions than tested."""
     pins = (ROOT / "test/requirements.txt").read_text().splitlines()
