@@ -35,7 +35,7 @@ def loaded_libraries(files: Iterable[Path], slim: Path) -> dict[str, Path]:
 
 
 def add_geodata(folder: Path, slim: Path) -> None:
-    """Adds the files that GDAL and PROJ read to groundray's own folder (core/io/own_folder.h)."""
+    """Adds the files that GDAL and PROJ read to groundray's own folder (core/own_folder.h)."""
     of_other_drivers = shutil.ignore_patterns(
         "grib2_*", "gml*", "inspire_*", "jpfgdgml_*", "plscenesconf.json", "*.svg", "*.png"
     )

@@ -20,9 +20,9 @@
 #include "apps/scan/usage_fault.h"
 #include "apps/scene/interruption.h"
 #include "core/error.h"
-#include "core/io/own_folder.h"
 #include "core/io/print_error.h"
 #include "core/near_names.h"
+#include "core/own_folder.h"
 
 namespace groundray::golden {
 namespace {

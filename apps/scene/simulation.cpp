@@ -20,7 +20,7 @@
 #include "core/error.h"
 #include "core/image/image_io.h"
 #include "core/io/memory.h"
-#include "core/io/own_folder.h"
+#include "core/own_folder.h"
 #include "sensors/camera/imager.h"
 #include "sensors/camera/lens/stereo.h"
 #include "sensors/lidar/pattern/scan_pattern.h"

@@ -68,19 +68,20 @@ Links links_of(double smoothness) {
 void smooth_line(Weighted* line, const std::uint8_t* grey, const Lines& lines, const Links& links,
                  std::vector<float>& next_share) {
   Weighted previous;
-  float before = 0, kept = 0;  // link to the previous pixel; what of it elimination leaves
+  // Of the previous pixel: its link, and the share of its pivot that is not a link.
+  float link_before = 0, share_before = 0;
   for (std::size_t i = 0; i < lines.pixels; ++i) {
     const std::size_t at = i * lines.stride;
-    float after = 0;
+    float link_after = 0;
     if (i + 1 < lines.pixels)
-      after =
+      link_after =
           links[static_cast<std::size_t>(std::abs(int{grey[at]} - int{grey[at + lines.stride]}))];
-    const float own = 1 + before * kept, pivot = own + after;
-    line[at].product_px = (line[at].product_px + before * previous.product_px) / pivot;
-    line[at].weight = (line[at].weight + before * previous.weight) / pivot;
-    next_share[i] = after / pivot;
-    kept = own / pivot;
-    before = after;
+    const float own = 1 + link_before * share_before, pivot = own + link_after;
+    line[at].product_px = (line[at].product_px + link_before * previous.product_px) / pivot;
+    line[at].weight = (line[at].weight + link_before * previous.weight) / pivot;
+    next_share[i] = link_after / pivot;
+    share_before = own / pivot;
+    link_before = link_after;
     previous = line[at];
   }
   for (std::size_t i = lines.pixels; i-- > 1;) {

@@ -18,7 +18,7 @@
 #include <string_view>
 #include <system_error>
 
-#include "core/io/own_folder.h"
+#include "core/own_folder.h"
 #include "terrain/dem/raster_input.h"
 
 namespace groundray {

@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "core/io/own_folder.h"
+#include "core/own_folder.h"
 
 namespace groundray::testing {
 

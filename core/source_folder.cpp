@@ -1,4 +1,4 @@
-#include "core/io/own_folder.h"
+#include "core/own_folder.h"
 
 namespace groundray {
 
