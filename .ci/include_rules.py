@@ -48,11 +48,15 @@ FOLDERS: dict[str, str] = {
     "sensors/lidar": "sensors/lidar/beam sensors/lidar/pattern sensors/lidar/receiver sensors/sky",
     "sensors/lidar/beam": "sensors/lidar sensors/lidar/pattern",
     "sensors/lidar/receiver": "sensors/sky",
-    "terrain": "terrain/dem terrain/lod terrain/lod/passes terrain/relief",
+    "terrain": "terrain/dem terrain/erosion terrain/lod terrain/lod/passes terrain/relief "
+    "terrain/trail",
     "terrain/lod": "terrain/dem terrain/lod/passes",
     "terrain/lod/passes": "terrain/lod",
-    "terrain/relief": "terrain/dem terrain/lod terrain/lod/passes",
+    "terrain/relief": "terrain/dem terrain/lod terrain/lod/passes terrain/trail",
     "terrain/scatter": "terrain terrain/dem terrain/lod",
+    "terrain/textures": "terrain/lod",
+    "terrain/trail": "terrain/dem",
+    "terrain/water": "terrain terrain/lod",
 }
 
 # What libraries as a whole may include, and each folder of apps/.

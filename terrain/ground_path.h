@@ -17,6 +17,7 @@ struct GroundPathSpec {
   glm::dvec2 footprint_m{2, 1.5};  ///< wheel base and track, in plan
   std::chrono::nanoseconds duration{0};  ///< duration of the drive
   glm::dvec2 origin_w_m{0};              ///< position of D in W, for messages
+  double from_m = 0;                     ///< arc length at which the drive starts
 };
 
 /// Returns the trajectory X_DB of a vehicle that follows the ground for [0, duration]: a pose every

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <utility>
 
+#include "core/error.h"
 #include "terrain/dem/byte_hash.h"
 #include "terrain/lod/deviation.h"
 #include "terrain/relief/refined_tiles.h"
@@ -54,9 +55,16 @@ std::string fingerprint_of(const HeightGrid& grid) {
 // Loads a DEM without its relief, as a whole or by tiles, depending on the size of the surface with
 // `relief`, which may be null.
 Terrain::Loaded Terrain::load_dem_alone(DemFile file, const TerrainDetail& detail,
-                                        const Progress& progress, const Relief* relief) {
+                                        const Progress& progress, const Relief* relief,
+                                        const std::optional<ErosionSpec>& erosion) {
   const DemHeader header = file.header();
   if (!fits(header.samples, detail)) {
+    if (erosion) {
+      throw Error(
+          "erosion needs all of the DEM in memory, but its {} x {} samples exceed memory_mib = {}: "
+          "cut the DEM, or raise memory_mib",
+          header.samples.x, header.samples.y, detail.memory_mib);
+    }
     const std::string text = file.fingerprint();
     Certificate certificate = Certificate::open_or_make(file, {.progress = progress});
     const Tiles tiles =
@@ -67,7 +75,8 @@ Terrain::Loaded Terrain::load_dem_alone(DemFile file, const TerrainDetail& detai
             fmt::format("{:016x}", byte_hash(text)),
             {}};
   }
-  const HeightGrid grid = file.load().grid;
+  HeightGrid grid = file.load().grid;
+  if (erosion) grid = eroded(grid, *erosion, memory_bytes(detail));
   const bool is_whole = relief == nullptr || fits(relief->frame().samples, detail);
   if (is_whole && detail.tolerance_m == 0 && detail.tolerance_rad == 0)
     return {header, grid, Ground(grid), fingerprint_of(grid), {}};
@@ -80,11 +89,14 @@ Terrain::Loaded Terrain::load_dem_alone(DemFile file, const TerrainDetail& detai
 }
 
 Terrain::Loaded Terrain::load(DemFile file, const TerrainDetail& detail, const Progress& progress,
-                              const std::optional<ReliefSpec>& spec) {
-  if (!spec) return load_dem_alone(std::move(file), detail, progress, nullptr);
-  const auto relief =
-      std::make_shared<const Relief>(*spec, frame_of(file.header()), memory_bytes(detail));
-  Loaded loaded = load_dem_alone(std::move(file), detail, progress, relief.get());
+                              const std::optional<ReliefSpec>& spec,
+                              const std::optional<ErosionSpec>& erosion) {
+  if (!spec) return load_dem_alone(std::move(file), detail, progress, nullptr, erosion);
+  const Relief without_trails(*spec, frame_of(file.header()), memory_bytes(detail));
+  Loaded loaded = load_dem_alone(std::move(file), detail, progress, &without_trails, erosion);
+  const auto relief = without_trails.with_trails(
+      spec->trails, [&](glm::dvec2 p) { return loaded.ground.height_m_at(p); },
+      loaded.header.origin_w_m);
   if (const auto* grid = std::get_if<HeightGrid>(&loaded.content)) {
     loaded.content = relief->refined(*grid);
     loaded.ground = std::get<HeightGrid>(loaded.content);
@@ -99,8 +111,8 @@ Terrain::Loaded Terrain::load(DemFile file, const TerrainDetail& detail, const P
 
 Terrain::Terrain(const std::filesystem::path& dem, const DemOptions& options,
                  const TerrainDetail& detail, const Progress& progress,
-                 const std::optional<ReliefSpec>& relief)
-    : detail_(detail), loaded_(load(DemFile(dem, options), detail, progress, relief)) {}
+                 const std::optional<ReliefSpec>& relief, const std::optional<ErosionSpec>& erosion)
+    : detail_(detail), loaded_(load(DemFile(dem, options), detail, progress, relief, erosion)) {}
 
 Level Terrain::whole_level() const {
   return full_resolution_level(*whole(), static_cast<double>(memory_bytes(detail_)));

@@ -9,6 +9,7 @@
 #include <variant>
 
 #include "terrain/dem/dem_file.h"
+#include "terrain/erosion/erosion.h"
 #include "terrain/ground.h"
 #include "terrain/lod/clipmap.h"
 #include "terrain/relief/relief.h"
@@ -30,13 +31,15 @@ class Terrain {
   /// Progress callback: receives the fraction of a long preparation that is done, 0 to 1.
   using Progress = std::function<void(double share)>;
 
-  /// @throws Error as load_dem, DemFile, Certificate::open_or_make and Relief.
+  /// @param erosion  of the DEM, before the relief is added; of a DEM that fits into memory only.
+  /// @throws Error as load_dem, DemFile, Certificate::open_or_make, eroded and Relief.
   Terrain(const std::filesystem::path& dem, const DemOptions& options, const TerrainDetail& detail,
-          const Progress& progress = {}, const std::optional<ReliefSpec>& relief = {});
+          const Progress& progress = {}, const std::optional<ReliefSpec>& relief = {},
+          const std::optional<ErosionSpec>& erosion = {});
 
   /// Returns the header of the DEM itself.
   const DemHeader& header() const noexcept { return loaded_.header; }
-  /// Returns the reference surface: the DEM's, with relief if there is any.
+  /// Returns the reference surface: the DEM's, eroded and with relief if they are given.
   const Ground& ground() const noexcept { return loaded_.ground; }
   /// Returns the grid of its samples in D.
   const GridFrame& frame() const noexcept { return ground().frame(); }
@@ -72,9 +75,10 @@ class Terrain {
     std::shared_ptr<const Relief> relief;
   };
   static Loaded load(DemFile file, const TerrainDetail& detail, const Progress& progress,
-                     const std::optional<ReliefSpec>& relief);
+                     const std::optional<ReliefSpec>& relief,
+                     const std::optional<ErosionSpec>& erosion);
   static Loaded load_dem_alone(DemFile file, const TerrainDetail& detail, const Progress& progress,
-                               const Relief* relief);
+                               const Relief* relief, const std::optional<ErosionSpec>& erosion);
 
   TerrainDetail detail_;
   Loaded loaded_;

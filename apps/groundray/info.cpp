@@ -121,11 +121,16 @@ void print_levels(const Simulation& simulation) {
 void print_cover(const TerrainSpec& terrain, const GroundCover& cover) {
   for (std::size_t i = 0; i < cover.layers().size(); ++i) {
     const CoverLayer& layer = cover.layers()[i];
-    const auto& material = i == 0 ? terrain.material : terrain.cover[i - 1].material;
-    print_text(stdout, "cover     {} of label {}{}{}\n", material ? material->name : "no material",
-               layer.label,
+    const CoverSpec* const spec = i == 0 ? nullptr : &terrain.cover[i - 1];
+    const auto& material = spec == nullptr ? terrain.material : spec->material;
+    const SiteConditions site = spec == nullptr ? SiteConditions{} : spec->site;
+    const bool has_file = spec != nullptr && !spec->mask.empty();
+    print_text(stdout, "cover     {} of label {}{}{}{}{}{}\n",
+               material ? material->name : "no material", layer.label,
                layer.texture ? fmt::format(", with images of {} m", layer.texture->size_m) : "",
-               layer.mask != nullptr ? ", by a mask" : "");
+               layer.lines.empty() ? "" : ", by the distance from trails",
+               site.water ? ", by water" : "", site.canopy ? ", by the canopy" : "",
+               has_file ? ", by a mask" : "");
   }
 }
 
@@ -147,10 +152,11 @@ void print_content(const SceneObjects& content) {
                group.label, group.first);
   }
   if (!content.shapes.empty()) {
-    std::size_t triangles = 0;
+    std::size_t triangles = 0, instances = 0;
+    for (const SceneObjects::Group& group : content.groups) instances += group.count;
     for (const ModelScene& shape : content.shapes) triangles += shape.model().mesh.triangles.size();
     print_text(stdout, "models    {} of {} triangles for {} objects\n", content.shapes.size(),
-               triangles, content.objects.size());
+               triangles, instances);
   }
   if (content.memory_bytes > 0) {
     print_text(stdout, "memory    {:.1f} MiB of objects, textures and cover\n",
@@ -165,18 +171,23 @@ std::string words_for(const ConstantSky& sky, const ClearAir& /*air*/) {
 std::string words_for(const EnvironmentImage& sky, const ClearAir& /*air*/) {
   return sky.image.string();
 }
-std::string words_for(const AnalyticSky& /*sky*/, const ClearAir& air) {
-  return fmt::format("clear, turbidity {}", air.turbidity);
+std::string words_for(const AnalyticSky& sky, const ClearAir& air) {
+  const std::string clouds =
+      sky.clouds ? fmt::format("clouds over {:g} %", 100 * sky.clouds->cover) : "clear";
+  return fmt::format("{}, turbidity {}", clouds, air.turbidity);
 }
 
 void print_sky(const SkySpec& spec) {
   print_text(stdout, "sky       {}\n",
              std::visit([&](const auto& dome) { return words_for(dome, spec.air); }, spec.dome));
   if (!spec.sun) return;
-  const Sun sun(*spec.sun, spec.air);
+  const Sun sun = sun_of(spec).value();
   const double azimuth_deg = glm::degrees(math::atan2(sun.direction().x, sun.direction().y));
-  print_text(stdout, "sun       elevation {:.2f}, azimuth {:.2f} degrees in W\n",
-             glm::degrees(sun.elevation_rad()), azimuth_deg < 0 ? azimuth_deg + 360 : azimuth_deg);
+  print_text(stdout, "sun       elevation {:.2f}, azimuth {:.2f} degrees in W{}\n",
+             glm::degrees(sun.elevation_rad()), azimuth_deg < 0 ? azimuth_deg + 360 : azimuth_deg,
+             sun.transmittance() < 1
+                 ? fmt::format("; clouds let {:.2g} % of its light pass", 100 * sun.transmittance())
+                 : "");
 }
 
 void print_lidar(const PlacedLidar& lidar) {

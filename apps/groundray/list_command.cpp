@@ -79,6 +79,7 @@ Json figures_json(AssetKind kind) {
   Json figures{{"size_m", defaults.size_m}};
   if (defaults.width_m) figures["width_m"] = *defaults.width_m;
   if (defaults.sag_m) figures["sag_m"] = *defaults.sag_m;
+  if (defaults.per_m2) figures["per_m2"] = *defaults.per_m2;
   if (defaults.leaf_area_index) figures["leaf_area_index"] = *defaults.leaf_area_index;
   return figures;
 }

@@ -1,8 +1,10 @@
 #include "apps/scene/model_library.h"
 
+#include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 #include <filesystem>
 #include <optional>
 #include <span>
@@ -19,14 +21,18 @@
 #include "core/model/displacement.h"
 #include "core/model/model_io.h"
 #include "terrain/assets/asset.h"
+#include "terrain/assets/asset_defaults.h"
+#include "terrain/assets/figure.h"
 
 namespace groundray {
 namespace {
 
 // Returns all members of a source, for comparison. If a member is added, this does not compile.
 auto parts(const AssetSpec& spec) {
-  const auto& [kind, size_m, width_m, sag_m, square_m, leaf_area_index, seed, detail] = spec;
-  return std::tuple(kind, size_m, width_m, sag_m, square_m, leaf_area_index, seed.value, detail);
+  const auto& [kind, size_m, width_m, sag_m, per_m2, square_m, leaf_area_index, leaves, health,
+               seed, detail] = spec;
+  return std::tuple(kind, size_m, width_m, sag_m, per_m2, square_m, leaf_area_index, leaves, health,
+                    seed.value, detail);
 }
 auto parts(const ModelSource& source) {
   const auto& [file, options, displacement] = source;
@@ -36,6 +42,10 @@ auto parts(const ModelSource& source) {
 }
 
 auto parts(const GivenModel& given) { return std::tuple(given.model); }
+
+auto parts(const AssetPart& part) {
+  return std::tuple_cat(parts(part.asset), std::tuple(part.part));
+}
 
 bool are_equal(const ModelSpec::Source& a, const ModelSpec::Source& b) {
   const auto equals_b = [&]<typename T>(const T& source) {
@@ -61,12 +71,18 @@ Model make(const ModelSource& source) {
 
 Model make(const GivenModel& given) { return *given.model; }
 
-// Checks that the surfaces to which materials are assigned exist.
-void check_names(const ModelSpec& spec, const Model& model) {
+Model make(const AssetPart& part) { return make_figure_part(part.asset, part.part); }
+
+// Checks that the surfaces to which materials are assigned exist in one of the models.
+void check_names(const ModelSpec& spec, std::span<const ModelScene> models) {
+  std::vector<std::string_view> names;
+  for (const ModelScene& scene : models) {
+    for (const ModelSurface& surface : scene.model().surfaces) {
+      if (std::ranges::count(names, surface.name) == 0) names.push_back(surface.name);
+    }
+  }
   for (const auto& [name, material] : spec.materials) {
-    if (std::ranges::count(model.surfaces, name, &ModelSurface::name) > 0) continue;
-    std::vector<std::string_view> names;
-    for (const ModelSurface& surface : model.surfaces) names.push_back(surface.name);
+    if (std::ranges::count(names, name) > 0) continue;
     throw Error("materials has the surface '{}', but the model has {}", name,
                 fmt::join(names, ", "));
   }
@@ -121,6 +137,46 @@ void add(const RetroReflector& retro, Fingerprint& print) {
   print.add_all(retro.coefficient_cd_lx_m2);
 }
 
+// Returns a material whose spectrum is multiplied such that its colour is about `color` under
+// equal energy, by a factor that is interpolated between the middles of the three bands and is 1
+// from 720 nm on: lasers and the near infrared see the material itself.
+Material tinted(Material material, const glm::vec3& color) {
+  auto* const matt = std::get_if<Lambertian>(&material.reflection);
+  if (matt == nullptr) return material;
+  constexpr std::array<double, 3> middles_nm = {610, 545, 460};
+  std::array<double, 3> gains{};
+  for (std::size_t i = 0; i < 3; ++i)
+    gains[i] = color[static_cast<int>(i)] / value_at(matt->spectrum, middles_nm[i]).value_or(0.2);
+  for (SpectrumSample& sample : matt->spectrum) {
+    const double nm = sample.wavelength_nm;
+    const auto between = [&](double from_nm, double to_nm, double from, double to) {
+      return from + (to - from) * std::clamp((nm - from_nm) / (to_nm - from_nm), 0.0, 1.0);
+    };
+    const double gain = nm < middles_nm[1]   ? between(460, 545, gains[2], gains[1])
+                        : nm < middles_nm[0] ? between(545, 610, gains[1], gains[0])
+                                             : between(670, 720, gains[0], 1);
+    sample.value = std::min(sample.value * gain, 1.0);
+  }
+  material.name += fmt::format(" of colour ({:.3f}, {:.3f}, {:.3f})", color.r, color.g, color.b);
+  return material;
+}
+
+// Returns a matt material under a clear coat of index 1.5; nothing changes if `alpha` is 0. The
+// base is brightened such that coat and base together reflect as much light, beside the gloss, as
+// the material did, by Saunderson's equation (J. Opt. Soc. Am. 32, 1942) with his reflectances of
+// the surface from outside, 0.092, and from inside, 0.596.
+Material coated(Material material, double alpha) {
+  auto* const matt = std::get_if<Lambertian>(&material.reflection);
+  if (matt == nullptr || alpha == 0) return material;
+  for (SpectrumSample& sample : matt->spectrum) {
+    constexpr double passes = (1 - 0.092) * (1 - 0.596), returned = 0.596;
+    sample.value = std::min(sample.value / (passes + returned * sample.value), 1.0);
+  }
+  material.reflection = Coated{.spectrum = std::move(matt->spectrum), .alpha = alpha};
+  material.name += " under a clear coat";
+  return material;
+}
+
 void check_colours(const Material& material) {
   try {
     bsdf_in_colour(material);
@@ -148,11 +204,18 @@ Palette::Palette(const SceneSpec& spec) {
   if (spec.terrain.material) add(*spec.terrain.material);
 }
 
-std::uint16_t Palette::index_of(const ModelSpec& model, const std::string& surface) {
+std::uint16_t Palette::index_of(const ModelSpec& model, const ModelSurface& worn) {
   if (!is_asked_for()) return 0;
+  const std::string& surface = worn.name;
   if (const auto found = model.materials.find(surface); found != model.materials.end())
     return add(found->second);
   if (model.material) return add(*model.material);
+  const bool is_asset = std::holds_alternative<AssetSpec>(model.source);
+  if (const auto stand_in = asset_stand_in(surface); is_asset && !stand_in.empty()) {
+    const Material matt =
+        load_material(data_folder() / "materials" / fmt::format("{}.yaml", stand_in));
+    return add(coated(tinted(matt, worn.color), asset_coat_alpha(surface)));
+  }
   const std::filesystem::path built_in = data_folder() / "materials" / (surface + ".yaml");
   if (!surface.empty() && std::filesystem::exists(built_in)) return add(load_material(built_in));
   throw Error(
@@ -192,15 +255,34 @@ std::uint32_t ModelLibrary::load(const Source& source) {
 }
 
 std::uint32_t ModelLibrary::add(const ModelSpec& spec, std::uint16_t label, Palette& palette) {
-  const std::uint32_t shape = load(spec.source);
-  const Model& model = shapes_[shape].model();
-  check_names(spec, model);
-  ModelTruth truth{label, {}};
-  for (const ModelSurface& surface : model.surfaces)
-    truth.materials.push_back(palette.index_of(spec, surface.name));
-  shape_of_.push_back(shape);
-  truths_.push_back(std::move(truth));
-  return size() - 1;
+  return add_all(spec, {&spec.source, 1}, label, palette);
+}
+
+std::uint32_t ModelLibrary::add_parts(const ModelSpec& spec, std::uint16_t label,
+                                      Palette& palette) {
+  const auto& asset = std::get<AssetSpec>(spec.source);
+  std::vector<Source> sources;
+  for (std::size_t part = 0; part < figure_parts(asset.kind); ++part)
+    sources.emplace_back(AssetPart{asset, part});
+  return add_all(spec, sources, label, palette);
+}
+
+std::uint32_t ModelLibrary::add_all(const ModelSpec& spec, std::span<const Source> sources,
+                                    std::uint16_t label, Palette& palette) {
+  const std::uint32_t first = size();
+  std::vector<ModelScene> added;
+  for (const Source& source : sources) {
+    shape_of_.push_back(load(source));
+    added.push_back(shapes_[shape_of_.back()]);
+  }
+  check_names(spec, added);
+  for (const ModelScene& shape : added) {
+    ModelTruth truth{label, {}};
+    for (const ModelSurface& surface : shape.model().surfaces)
+      truth.materials.push_back(palette.index_of(spec, surface));
+    truths_.push_back(std::move(truth));
+  }
+  return first;
 }
 
 std::vector<ModelScene> ModelLibrary::models() const {

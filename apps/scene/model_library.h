@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -22,7 +23,7 @@ class Palette {
   /// Returns the number of a surface's material.
   /// @throws Error if it has none, or its spectrum lacks a laser's wavelength or, for cameras, a
   ///         part of the visible range.
-  std::uint16_t index_of(const ModelSpec& model, const std::string& surface);
+  std::uint16_t index_of(const ModelSpec& model, const ModelSurface& worn);
   /// Returns the number of a material of the ground; 0 if there is none.
   /// @throws Error as for a surface.
   std::uint16_t index_of(const std::optional<Material>& material);
@@ -48,7 +49,12 @@ class ModelLibrary {
   /// @throws Error if it cannot be loaded, or a surface that `spec` names is missing or has no
   ///         material.
   std::uint32_t add(const ModelSpec& spec, std::uint16_t label, Palette& palette);
+  /// Adds all parts of an asset that walks, with consecutive indices; returns the first.
+  /// @throws Error as add.
+  std::uint32_t add_parts(const ModelSpec& spec, std::uint16_t label, Palette& palette);
 
+  /// Returns a model by its index.
+  const Model& model(std::uint32_t index) const { return shapes_[shape_of_[index]].model(); }
   std::vector<ModelScene> models() const;  ///< models of the same source share its shape
   const std::vector<ModelTruth>& truths() const { return truths_; }
   std::uint32_t size() const { return static_cast<std::uint32_t>(truths_.size()); }
@@ -63,6 +69,8 @@ class ModelLibrary {
  private:
   using Source = ModelSpec::Source;
   std::uint32_t load(const Source& source);  // returns the index of the shape
+  std::uint32_t add_all(const ModelSpec& spec, std::span<const Source> sources, std::uint16_t label,
+                        Palette& palette);
 
   RayDevice device_;
   Tracing tracing_;

@@ -12,6 +12,7 @@
 #include "core/io/tum_io.h"
 #include "sensors/lidar/pattern/scan_pattern.h"
 #include "terrain/ground_path.h"
+#include "terrain/trail/trails.h"
 
 namespace groundray {
 namespace {
@@ -62,16 +63,26 @@ Trajectory recorded_path(const RecordedPath& path, const Terrain& terrain,
 Trajectory driven_path(const DrivenPath& path, const Terrain& terrain,
                        std::chrono::nanoseconds duration) {
   const glm::dvec2 origin_w_m(terrain.header().origin_w_m);
-  GroundPathSpec drive{{}, path.speed_m_s, path.height_m, path.footprint_m, duration, origin_w_m};
-  for (const glm::dvec2& p_W : path.waypoints_m) drive.waypoints_m.push_back(p_W - origin_w_m);
-  return located(path.where, "key 'waypoints_m'", [&] {
+  GroundPathSpec drive{.waypoints_m = {},
+                       .speed_m_s = path.speed_m_s,
+                       .height_m = path.height_m,
+                       .footprint_m = path.footprint_m,
+                       .duration = duration,
+                       .origin_w_m = origin_w_m,
+                       .from_m = path.from_m};
+  const bool is_trail = !path.trail.empty();
+  const std::vector<glm::dvec2>& waypoints_w_m =
+      is_trail ? terrain.relief()->trails()->named(path.trail).spec().waypoints_m
+               : path.waypoints_m;
+  for (const glm::dvec2& p_W : waypoints_w_m) drive.waypoints_m.push_back(p_W - origin_w_m);
+  return located(path.where, is_trail ? "key 'trail'" : "key 'waypoints_m'", [&] {
     const auto outside = std::ranges::find_if(
-        path.waypoints_m, [&](glm::dvec2 p_W) { return !is_on_dem(terrain, p_W); });
-    if (outside == path.waypoints_m.end()) return build_ground_path(terrain.ground(), drive);
+        waypoints_w_m, [&](glm::dvec2 p_W) { return !is_on_dem(terrain, p_W); });
+    if (outside == waypoints_w_m.end()) return build_ground_path(terrain.ground(), drive);
     const std::string rule = fmt::format("waypoint {}, ({}, {}), is outside the DEM: {}",
-                                         outside - path.waypoints_m.begin() + 1, outside->x,
+                                         outside - waypoints_w_m.begin() + 1, outside->x,
                                          outside->y, dem_extent(terrain, *outside));
-    if (outside == path.waypoints_m.begin()) throw Error(rule);
+    if (outside == waypoints_w_m.begin()) throw Error(rule);
     try {
       return build_ground_path(terrain.ground(), drive);  // the drive may end before
     } catch (const Error& fault) {

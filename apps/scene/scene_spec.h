@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <glm/vec2.hpp>
@@ -11,22 +12,19 @@
 #include <variant>
 #include <vector>
 
-#include "core/appearance/ground_cover.h"
+#include "apps/scene/ground_spec.h"
 #include "core/appearance/material.h"
 #include "core/geometry/pose.h"
 #include "core/model/model_io.h"
 #include "core/random.h"
 #include "core/tracing/ray.h"
+#include "core/tracing/sway.h"
 #include "sensors/camera/camera_spec.h"
 #include "sensors/lidar/lidar_spec.h"
 #include "sensors/sky/atmosphere.h"
 #include "sensors/sky/sky.h"
 #include "terrain/assets/asset.h"
-#include "terrain/dem/dem_io.h"
-#include "terrain/dem/density_map.h"
-#include "terrain/relief/relief.h"
 #include "terrain/scatter/scatter.h"
-#include "terrain/terrain.h"
 
 namespace groundray {
 
@@ -41,11 +39,13 @@ struct RecordedPath {
 
 /// Path driven over the ground (see GroundPathSpec); waypoints in W, the CRS of the DEM.
 struct DrivenPath {
-  std::vector<glm::dvec2> waypoints_m;
+  std::vector<glm::dvec2> waypoints_m;  ///< none if it follows a trail
+  std::string trail;                    ///< name of a trail, or empty
   double speed_m_s = 1;
   double height_m = 0;
   glm::dvec2 footprint_m{2, 1.5};
-  std::string where;  ///< of the waypoints
+  double from_m = 0;  ///< arc length at which it starts
+  std::string where;  ///< of the waypoints, or of the trail's name
 };
 
 /// Image that displaces a model's surface; see Displacement.
@@ -68,38 +68,28 @@ struct GivenModel {
   std::shared_ptr<const Model> model;
 };
 
+/// Rigid part of an asset that walks.
+struct AssetPart {
+  AssetSpec asset;
+  std::size_t part = 0;
+};
+
 /// Model and its materials.
 struct ModelSpec {
-  using Source = std::variant<AssetSpec, ModelSource, GivenModel>;
+  using Source = std::variant<AssetSpec, ModelSource, GivenModel, AssetPart>;
   Source source;
   std::map<std::string, Material> materials;  ///< materials by surface name
   std::optional<Material> material;           ///< material of all other surfaces
+  std::optional<Flexibility> sway;            ///< that of the kind for assets, else none
 };
 
-/// Static object: position of its origin in W, and its orientation.
+/// Static object: position of its origin in W, and its orientation; or a fence along a line.
 struct StandingObject {
   glm::dvec2 at_m{0};
   std::optional<double> height_m;  ///< height in W; on the ground by default
   double yaw_deg = 0, pitch_deg = 0, roll_deg = 0;
   Stance stance = Stance::Upright;
-};
-
-/// Images that repeat over the ground.
-struct GroundTextureSpec {
-  std::filesystem::path albedo, normal;  ///< empty for none
-  double size_m = 1;                     ///< size of one copy
-};
-
-/// Layer of the ground's cover.
-struct CoverSpec {
-  std::optional<Material> material;    ///< required if there is a camera or a lidar with light
-  std::optional<std::uint16_t> label;  ///< the terrain's by default
-  CoverLimits slope_rad{};
-  CoverLimits height_m{};      ///< heights in W
-  std::filesystem::path mask;  ///< empty for none
-  double mask_full = 1;        ///< value of the mask that means full cover
-  std::optional<double> mask_nodata;
-  std::optional<GroundTextureSpec> texture;
+  std::vector<glm::dvec2> line_m{};  ///< of a fence, in W, instead of the above; else empty
 };
 
 /// Object of a scene.
@@ -112,6 +102,19 @@ struct ObjectSpec {
   std::string where;
 };
 
+/// Ground that is kept free along a trail.
+struct ClearedTrail {
+  std::string name;
+  double half_width_m = 0;
+};
+
+/// Species of an ecosystem, whose plants compete for room.
+struct SpeciesSpec {
+  double zone = 1;       ///< radius of a plant's zone of influence, as a multiple of its crown's
+  double tolerance = 0;  ///< of shade; see Contender
+  double min_distance_m = 0;
+};
+
 /// Layer of scattered objects.
 struct ScatterLayer {
   std::string name;
@@ -120,22 +123,12 @@ struct ScatterLayer {
   double density_per_m2 = 0;  ///< per horizontal square metre; with a map, per unit of its values
   std::filesystem::path density_map;  ///< empty for the same density everywhere
   std::optional<double> nodata;       ///< nodata value of the map
+  Area area_W;                        ///< nothing grows outside
   ScatterSpec scatter;                ///< clearings in W; its `layer` is a hash of the name
+  std::vector<ClearedTrail> trails;   ///< further clearings
+  SiteConditions site;
+  std::optional<SpeciesSpec> species;  ///< if set, the scale of `scatter` is the height in metres
   std::string where;
-};
-
-/// Ground of a scene.
-struct TerrainSpec {
-  std::filesystem::path dem;  ///< absolute, or relative to the working directory
-  DemOptions options;
-  std::uint16_t label = 1;           ///< semantic class of the ground
-  std::optional<Material> material;  ///< required if there is a camera or a lidar with light
-  TerrainDetail detail;
-  std::optional<ReliefSpec> relief;
-  std::optional<GroundTextureSpec> texture;  ///< texture of `material`
-  std::vector<CoverSpec> cover;      ///< layers over `material`, from the lowest to the uppermost
-  std::filesystem::path orthophoto;  ///< empty for none
-  std::string where;                 ///< of the DEM's name
 };
 
 /// Lidar and its mount.
@@ -193,6 +186,7 @@ struct SceneSpec {
   std::vector<ObjectSpec> objects;
   std::vector<ScatterLayer> scatter;
   std::optional<SkySpec> sky;
+  Wind wind;  ///< without origin and variant, which follow from the terrain and the seed
 };
 
 }  // namespace groundray

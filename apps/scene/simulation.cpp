@@ -358,7 +358,7 @@ Simulation load_simulation(const std::filesystem::path& scene, std::optional<See
 Simulation build_simulation(SceneSpec spec, const Terrain::Progress& progress) {
   Terrain terrain = located(spec.terrain.where, "key 'dem'", [&] {
     return Terrain(spec.terrain.dem, spec.terrain.options, spec.terrain.detail, progress,
-                   spec.terrain.relief);
+                   spec.terrain.relief, spec.terrain.erosion);
   });
   return completed(std::move(spec), std::move(terrain), build_scene_objects);
 }

@@ -150,9 +150,9 @@ class Map {
   template <typename T>
     requires std::is_enum_v<T>
   const Node* read_choice(std::string_view key, Need need, T& into,
-                          std::initializer_list<std::string_view> words) {
+                          const std::vector<std::string>& words) {
     std::size_t index = 0;
-    const Node* node = read_choice(key, need, index, {words.begin(), words.end()});
+    const Node* node = read_choice(key, need, index, words);
     if (node) into = static_cast<T>(index);
     return node;
   }

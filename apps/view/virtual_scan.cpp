@@ -61,7 +61,7 @@ void apply_scene_settings(const SceneSpec& scene, const Materials& materials, Li
   }
   SolarBackground& background = lidar.light->sun;
   if (background.irradiance_w_m2_nm || !scene.sky || !scene.sky->sun) return;
-  const Sun sun(*scene.sky->sun, scene.sky->air);
+  const Sun sun = sun_of(*scene.sky).value();
   background.irradiance_w_m2_nm = solar_irradiance_w_m2_nm(sun, lidar.light->wavelength_nm);
   background.direction = sun.direction();
 }

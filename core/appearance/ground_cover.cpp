@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <limits>
 #include <utility>
 
 #include "core/appearance/normal_map.h"
 #include "core/appearance/texture.h"
+#include "core/appearance/tiling.h"
 #include "core/elementary.h"
 #include "core/error.h"
 
@@ -36,14 +38,16 @@ void check_layers(std::span<const CoverLayer> layers) {
     const CoverLayer& layer = layers[i];
     check_limits(broken, i, "slope", layer.slope_rad);
     check_limits(broken, i, "height", layer.height_m);
+    check_limits(broken, i, "distance from lines", layer.distance_m);
     const double size_m = layer.texture ? layer.texture->size_m : 1;
     broken.unless(size_m > 0 && std::isfinite(size_m),
                   "layer {}: size_m = {} of its texture must be positive and finite", i + 1,
                   size_m);
   }
-  broken.unless(layers.empty() || (is_everywhere(layers[0].slope_rad) &&
-                                   is_everywhere(layers[0].height_m) && layers[0].mask == nullptr),
-                "layer 1 must have no limits and no mask: it covers what the other layers do not");
+  broken.unless(
+      layers.empty() || (is_everywhere(layers[0].slope_rad) && is_everywhere(layers[0].height_m) &&
+                         layers[0].lines.empty() && layers[0].mask == nullptr),
+      "layer 1 must have no limits and no mask: it covers what the other layers do not");
   broken.throw_if_any();
 }
 
@@ -66,6 +70,11 @@ std::optional<glm::vec3> seen(const Drape& orthophoto, const GroundCover::Point&
   return orthophoto.image.color(uv, footprint, filtering);
 }
 
+// Returns a point of D relative to the corner of a copy.
+glm::dvec3 in_copies(const GroundTexture& texture, const glm::dvec3& p_D) noexcept {
+  return p_D - glm::dvec3(texture.corner_m, 0);
+}
+
 // Shading normal of a triplanar normal map, in D; not normalised.
 glm::dvec3 bumped(const GroundTexture& texture, const GroundCover::Point& point,
                   const SurfacePatch& patch, Filtering filtering) noexcept {
@@ -83,13 +92,20 @@ glm::dvec3 bumped(const GroundTexture& texture, const GroundCover::Point& point,
     along.dp_du[axis] = -texture.size_m * n[u] / n[axis];
     along.dp_dv[axis] = -texture.size_m * n[v] / n[axis];
     const glm::vec3 texel =
-        texture.normal->color(flat(point.p_D), {flat(patch.a_m), flat(patch.b_m)}, filtering);
+        tiled_color(*texture.normal, flat(in_copies(texture, point.p_D)),
+                    {flat(patch.a_m), flat(patch.b_m)}, filtering, texture.tiling);
     sum += weights[axis] * shading_normal(along, n, n, decode_normal(texel));
   }
   return sum;
 }
 
 }  // namespace
+
+double CoverLine::distance_m(glm::dvec2 p) const noexcept {
+  const auto place = field->place(p);
+  return place ? std::abs(std::abs(place->across_m) - aside_m) - half_width_m
+               : std::numeric_limits<double>::max();
+}
 
 double CoverLimits::share(double value) const noexcept {
   return std::min(rise(value - low, blend), rise(high - value, blend));
@@ -135,8 +151,14 @@ GroundCover::Shares GroundCover::shares_at(const Point& point) const noexcept {
   for (std::size_t i = layers_.size(); i-- > 1 && left > 0;) {
     const CoverLayer& layer = layers_[i];
     double share = layer.slope_rad.share(point.slope_rad) * layer.height_m.share(point.p_D.z);
+    const glm::dvec2 p_D(point.p_D);
+    if (share > 0 && !layer.lines.empty()) {
+      double nearest_m = std::numeric_limits<double>::max();
+      for (const CoverLine& line : layer.lines)
+        nearest_m = std::min(nearest_m, line.distance_m(p_D));
+      share *= layer.distance_m.share(nearest_m);
+    }
     if (share > 0 && layer.mask != nullptr) {
-      const glm::dvec2 p_D(point.p_D);
       share *= layer.mask->covers(p_D)
                    ? static_cast<double>(layer.mask->image.color(layer.mask->uv_at(p_D)).r)
                    : 0.0;
@@ -152,8 +174,9 @@ Tint GroundCover::tint_at(std::size_t layer, const Point& point, const SurfacePa
                           Filtering filtering) const noexcept {
   Tint tint;
   if (const auto& texture = layers_[layer].texture; texture && texture->albedo) {
-    const glm::vec3 texel = triplanar_color(*texture->albedo, point.p_D, point.normal, patch,
-                                            texture->size_m, filtering);
+    const glm::vec3 texel =
+        triplanar_color(*texture->albedo, in_copies(*texture, point.p_D), point.normal, patch,
+                        texture->size_m, filtering, texture->tiling);
     tint = tint_of(texel, glm::vec3(texture->albedo->mean()));
   }
   if (orthophoto_ == nullptr) return tint;

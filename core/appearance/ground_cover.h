@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <limits>
 #include <memory>
@@ -12,6 +13,7 @@
 
 #include "core/appearance/texture.h"
 #include "core/geometry/footprint.h"
+#include "core/geometry/line_field.h"
 
 namespace groundray {
 
@@ -37,6 +39,8 @@ struct GroundTexture {
   std::shared_ptr<const Texture> albedo;  ///< or null
   std::shared_ptr<const Texture> normal;  ///< green up, as in core/model/model.h; or null
   double size_m = 1;                      ///< side of one copy; positive
+  Tiling tiling = Tiling::Repeat;
+  glm::dvec2 corner_m{0};  ///< lower left corner of a copy, in D
 };
 
 /// Range of a quantity in which a layer lies. Each limit is the centre of a ramp of width `blend`;
@@ -50,6 +54,16 @@ struct CoverLimits {
   double share(double value) const noexcept;
 };
 
+/// Line on the ground, or a pair of lines beside it, from which distances are measured.
+struct CoverLine {
+  std::shared_ptr<const LineField> field;
+  double aside_m = 0;       ///< distance of the pair from the field's line
+  double half_width_m = 0;  ///< distances count from here on, and are negative nearer
+
+  /// Returns the distance of `p` (D); the largest double beyond the field's reach.
+  double distance_m(glm::dvec2 p) const noexcept;
+};
+
 /// One of the ground's materials and its extent. The layer's weight at a point is the product of
 /// the values of its limits and of its mask.
 struct CoverLayer {
@@ -57,6 +71,8 @@ struct CoverLayer {
   std::uint16_t label = 0;            ///< semantic class
   CoverLimits slope_rad{};            ///< of the ground (see Point)
   CoverLimits height_m{};             ///< in D
+  CoverLimits distance_m{};           ///< from the nearest of `lines`, if there are any
+  std::vector<CoverLine> lines{};     ///< with fields that reach as far as the limits
   std::shared_ptr<const Drape> mask;  ///< weight in its first channel, 0 to 1; 0 outside; or null
   std::optional<GroundTexture> texture;
 };

@@ -11,6 +11,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "core/appearance/tiling.h"
 #include "core/error.h"
 #include "core/image/srgb.h"
 
@@ -368,8 +369,8 @@ glm::dvec3 triplanar_weights(const glm::dvec3& normal) noexcept {
 }
 
 glm::vec3 triplanar_color(const Texture& texture, const glm::dvec3& p_m, const glm::dvec3& normal,
-                          const SurfacePatch& patch, double period_m,
-                          Filtering filtering) noexcept {
+                          const SurfacePatch& patch, double period_m, Filtering filtering,
+                          Tiling tiling) noexcept {
   const glm::dvec3 weights = triplanar_weights(normal);
   glm::vec3 color(0);
   for (glm::length_t axis = 0; axis < 3; ++axis) {
@@ -377,7 +378,8 @@ glm::vec3 triplanar_color(const Texture& texture, const glm::dvec3& p_m, const g
     const glm::length_t u = axis == 0 ? 1 : 0, v = axis == 2 ? 1 : 2;
     const auto flat = [&](const glm::dvec3& d_m) { return glm::dvec2(d_m[u], d_m[v]) / period_m; };
     const Footprint footprint{flat(patch.a_m), flat(patch.b_m)};
-    color += static_cast<float>(weights[axis]) * texture.color(flat(p_m), footprint, filtering);
+    color += static_cast<float>(weights[axis]) *
+             tiled_color(texture, flat(p_m), footprint, filtering, tiling);
   }
   return color;
 }

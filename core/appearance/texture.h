@@ -21,6 +21,10 @@ enum class Encoding { Linear, Srgb };
 /// Continuation beyond the image: repeats of it, or its edge texels.
 enum class Wrap { Repeat, Clamp };
 
+/// Continuation of a texture over the ground: repeats of the image, or pieces of it at random
+/// offsets, blended, which show no period. See tiled_color.
+enum class Tiling { Repeat, Stochastic };
+
 /// Method of averaging over a footprint; see Texture::color.
 enum class Filtering { Fast, Exact };
 
@@ -148,6 +152,7 @@ glm::dvec3 triplanar_weights(const glm::dvec3& normal) noexcept;
 /// @param patch  patch of the surface that the ray covers.
 /// @param period_m  metres on the ground for each repeat of the texture; positive.
 glm::vec3 triplanar_color(const Texture& texture, const glm::dvec3& p_m, const glm::dvec3& normal,
-                          const SurfacePatch& patch, double period_m, Filtering filtering) noexcept;
+                          const SurfacePatch& patch, double period_m, Filtering filtering,
+                          Tiling tiling = Tiling::Repeat) noexcept;
 
 }  // namespace groundray

@@ -5,15 +5,16 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <glm/mat3x3.hpp>
-#include <limits>
 #include <utility>
 
 #include "core/error.h"
-#include "core/math.h"
 #include "core/tracing/device.h"
+#include "core/tracing/object_box.h"
 #include "core/tracing/object_packet.h"
+#include "core/tracing/object_tracer_impl.h"
 
 namespace groundray {
 namespace {
@@ -77,126 +78,6 @@ void clip(const glm::dvec3& origin, const glm::dvec3& direction, const glm::dvec
 
 }  // namespace
 
-struct ObjectTracer::Impl {
-  // Bounding box in D.
-  struct Box {
-    glm::dvec3 low{std::numeric_limits<double>::infinity()};
-    glm::dvec3 high{-std::numeric_limits<double>::infinity()};
-    void add(const Box& other) noexcept {
-      low = glm::min(low, other.low);
-      high = glm::max(high, other.high);
-    }
-  };
-
-  // Interval of a moving object's trajectory, and a bounding box of the object over the interval.
-  struct Stretch {
-    nanoseconds begin{0}, end{0};
-    Box box;
-  };
-
-  RayDevice device;
-  std::vector<ModelScene> models;
-  std::vector<PlacedObject> placed;
-  std::vector<MovingObject> moving;
-  // Interval mapped to Embree's times 0 to 1: from the first pose of any trajectory to the last.
-  nanoseconds begin_time{0}, end_time{0};
-  std::size_t time_steps = 1;
-  std::vector<Box> moving_boxes;  // of all moving objects, at each time step
-  Box box;                        // of all objects
-  glm::dvec3 p_DC{0};             // origin of the scene's floats: the centre of `box`
-  float slack_m = 0;              // padding that covers rounding to float
-  Owned<RTCScene> scene;
-
-  Impl(const RayDevice& with, std::vector<ModelScene> what, std::vector<PlacedObject> standing,
-       std::vector<MovingObject> going);
-  Impl(const Impl&) = delete;
-  Impl& operator=(const Impl&) = delete;
-
-  const ModelScene::Impl& model(std::uint32_t number) const noexcept {
-    return models[number].impl();
-  }
-  Box box_of(const PlacedObject& object) const noexcept;
-  std::vector<Stretch> stretches_of(const MovingObject& object) const;
-  void find_moving_boxes();
-  nanoseconds time_of(std::size_t step) const noexcept {
-    if (time_steps == 1) return begin_time;
-    const double share = static_cast<double>(step) / static_cast<double>(time_steps - 1);
-    return begin_time +
-           nanoseconds(std::llround(share * static_cast<double>((end_time - begin_time).count())));
-  }
-  float share_of(nanoseconds time) const noexcept {
-    if (begin_time == end_time) return 0;
-    const double share = static_cast<double>((time - begin_time).count()) /
-                         static_cast<double>((end_time - begin_time).count());
-    return static_cast<float>(std::clamp(share, 0.0, 1.0));
-  }
-  Pose pose(const MovingObject& object, nanoseconds time) const {
-    const Trajectory& X_DO = object.X_DO;
-    return X_DO.pose_at(std::clamp(time, X_DO.begin_time(), X_DO.end_time()));
-  }
-  RTCBounds bounds(const Box& of) const noexcept {
-    const glm::vec3 low = glm::vec3(of.low - p_DC) - slack_m;
-    const glm::vec3 high = glm::vec3(of.high - p_DC) + slack_m;
-    return {low.x, low.y, low.z, 0, high.x, high.y, high.z, 0};
-  }
-  void build();
-
-  template <int W>
-  static void meet_placed(const RTCIntersectFunctionNArguments* arguments);
-  template <int W>
-  static void meet_moving(const RTCIntersectFunctionNArguments* arguments);
-  static void placed_bounds(const RTCBoundsFunctionArguments* arguments);
-  static void moving_bounds(const RTCBoundsFunctionArguments* arguments);
-  template <int W>
-  void trace_packet(std::span<const Ray> rays, std::span<Hit> hits) const noexcept;
-  template <int W>
-  void trace(std::span<const Ray> rays, std::span<Hit> hits) const noexcept;
-};
-
-auto ObjectTracer::Impl::box_of(const PlacedObject& object) const noexcept -> Box {
-  const ModelScene::Impl& shape = model(object.model);
-  const glm::dmat3 R_DO = glm::mat3_cast(object.R_DO);
-  const glm::dvec3 half_m = (shape.high_m - shape.low_m) / 2.0;
-  const glm::dvec3 centre_m = object.p_DO + object.scale * (R_DO * shape.centre_m);
-  glm::dvec3 reach_m(0);
-  for (int k = 0; k < 3; ++k) reach_m += glm::abs(R_DO[k]) * half_m[k];
-  reach_m *= object.scale * (1 + 1e-12);
-  return {centre_m - reach_m, centre_m + reach_m};
-}
-
-// Between two poses, the object's origin deviates from the straight line between them by at most
-// the height of the arc that turns by the same angle; a ball round the origin contains the rest of
-// the object.
-auto ObjectTracer::Impl::stretches_of(const MovingObject& object) const -> std::vector<Stretch> {
-  std::vector<Stretch> stretches;
-  const auto& samples = object.X_DO.samples();
-  const double ball_m = object.scale * model(object.model).radius_m;
-  const auto add = [&](nanoseconds begin, nanoseconds end, const Pose& a, const Pose& b) {
-    const double angle_rad =
-        2 * math::acos(std::min(std::abs(glm::dot(a.rotation, b.rotation)), 1.0));
-    const double arc_m =
-        glm::distance(a.translation_m, b.translation_m) / 2 * math::tan(angle_rad / 4);
-    const double pad_m = (ball_m + arc_m) * (1 + 1e-9);
-    stretches.push_back({begin,
-                         end,
-                         {glm::min(a.translation_m, b.translation_m) - pad_m,
-                          glm::max(a.translation_m, b.translation_m) + pad_m}});
-  };
-  const auto first = samples.front(), last = samples.back();
-  std::vector<nanoseconds> times;
-  for (const Trajectory::Sample& sample : samples) times.push_back(sample.time);
-  for (std::size_t step = 0; step < time_steps; ++step) {
-    const nanoseconds time = time_of(step);
-    if (first.time < time && time < last.time) times.push_back(time);
-  }
-  std::ranges::sort(times);
-  add(nanoseconds::min(), first.time, first.pose, first.pose);
-  for (std::size_t i = 0; i + 1 < times.size(); ++i)
-    add(times[i], times[i + 1], object.X_DO.pose_at(times[i]), object.X_DO.pose_at(times[i + 1]));
-  add(last.time, nanoseconds::max(), last.pose, last.pose);
-  return stretches;
-}
-
 // Embree interpolates boxes linearly between time steps. The box at a step contains all positions
 // of the object from the previous step to the next one, with a margin because Embree's times are
 // floats. Therefore the boxes of two adjacent steps both contain everything between them.
@@ -210,14 +91,17 @@ void ObjectTracer::Impl::find_moving_boxes() {
   }
   time_steps = begin_time == end_time ? 1 : most_time_steps;
   const nanoseconds slack = (end_time - begin_time) / 1'000'000;
+  std::vector<nanoseconds> times;
+  for (std::size_t step = 0; step < time_steps; ++step) times.push_back(time_of(step));
   for (const MovingObject& object : moving) {
-    const std::vector<Stretch> stretches = stretches_of(object);
+    const double ball_m = object.scale * model(object.model).radius_m;
+    const std::vector<ObjectStretch> stretches = stretches_of(object.X_DO, ball_m, times);
     for (std::size_t step = 0; step < time_steps; ++step) {
       const bool is_first = step == 0, is_last = step + 1 == time_steps;
       const nanoseconds begin = is_first ? nanoseconds::min() : time_of(step - 1) - slack;
       const nanoseconds end = is_last ? nanoseconds::max() : time_of(step + 1) + slack;
-      Box& all = moving_boxes.emplace_back();
-      for (const Stretch& stretch : stretches) {
+      ObjectBox& all = moving_boxes.emplace_back();
+      for (const ObjectStretch& stretch : stretches) {
         if (stretch.begin <= end && begin <= stretch.end) all.add(stretch.box);
       }
       box.add(all);
@@ -226,9 +110,15 @@ void ObjectTracer::Impl::find_moving_boxes() {
 }
 
 ObjectTracer::Impl::Impl(const RayDevice& with, std::vector<ModelScene> what,
-                         std::vector<PlacedObject> standing, std::vector<MovingObject> going)
+                         std::vector<PlacedObject> standing, std::vector<MovingObject> going,
+                         std::vector<Sway> swaying)
     : device(with), models(std::move(what)), placed(std::move(standing)), moving(std::move(going)) {
   check_objects(models, placed, moving);
+  for (std::uint32_t i = 0; i < moving.size(); ++i) {
+    if (i == 0 || moving[i].body == 0 || moving[i].body != moving[i - 1].body)
+      first_parts.push_back(i);
+  }
+  if (!std::ranges::all_of(swaying, &Sway::is_still)) sways = std::move(swaying);
   for (const PlacedObject& object : placed) box.add(box_of(object));
   find_moving_boxes();
   p_DC = (box.low + box.high) / 2.0;
@@ -255,7 +145,8 @@ void ObjectTracer::Impl::build() {
     attach_primitives(device, scene.get(), id, count, this, bounds_of, intersect, steps);
   };
   with_packet_width(device, [&](auto width) {
-    add(placed_geometry, placed.size(), 1, placed_bounds, meet_placed<width>);
+    add(placed_geometry, placed.size(), 1, placed_bounds,
+        sways.empty() ? meet_placed<width> : meet_swaying<width>);
     add(moving_geometry, moving.size(), time_steps, moving_bounds, meet_moving<width>);
   });
   commit(scene.get());
@@ -302,6 +193,46 @@ void ObjectTracer::Impl::meet_placed(const RTCIntersectFunctionNArguments* argum
   for_each_lane(arguments, [&](std::size_t lane) { local.valid[lane] = -1; });
   for (std::size_t i = 0; i < W; ++i) transform_ray(into, packet, i, local);
   intersect<W>(model, arguments->primID + 1, all, local, packet);
+  shorten(arguments, packet, tracer.slack_m);
+}
+
+// Intersects the object as it leans at each ray's own time. The map to the upright model is linear,
+// so rays stay straight, and ranges are as accurate as those of stationary objects.
+template <int W>
+void ObjectTracer::Impl::meet_swaying(const RTCIntersectFunctionNArguments* arguments) {
+  const auto& tracer = *static_cast<const Impl*>(arguments->geometryUserPtr);
+  const PlacedObject& object = tracer.placed[arguments->primID];
+  if (tracer.is_still(object)) return meet_placed<W>(arguments);
+  auto& packet = *reinterpret_cast<ObjectQuery<W>*>(arguments->context)->packet;
+  std::array<std::size_t, W> lanes;
+  std::array<double, W> times_s;
+  std::size_t count = 0;
+  for_each_lane(arguments, [&](std::size_t lane) {
+    lanes[count] = lane;
+    times_s[count++] = seconds(packet.time[lane]);
+  });
+  const bool is_at_once = std::all_of(times_s.begin(), times_s.begin() + count,
+                                      [&](double time_s) { return time_s == times_s[0]; });
+  std::array<Lean, W> leans;
+  tracer.sways[object.model].lean(glm::dvec2(object.p_DO), object.scale,
+                                  std::span(times_s).first(is_at_once ? 1 : count), leans);
+  const ObjectFromWorld upright = into_model(object.R_DO, object.p_DO, object.scale);
+  std::array<ObjectFromWorld, W> into;
+  std::array<const ObjectFromWorld*, W> all;
+  LocalPacket<W> local;
+  local.valid.fill(0);
+  if (count < W) {
+    for (std::size_t i = 0; i < W; ++i) transform_ray(upright, packet, i, local);
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t lane = lanes[i];
+    into[lane] = upright;
+    into[lane].per_D[2] = upright.per_D * leans[is_at_once ? 0 : i].upright({0, 0, 1});
+    all[lane] = &into[lane];
+    local.valid[lane] = -1;
+    transform_ray(into[lane], packet, lane, local);
+  }
+  intersect<W>(tracer.model(object.model), arguments->primID + 1, all, local, packet);
   shorten(arguments, packet, tracer.slack_m);
 }
 
@@ -386,9 +317,10 @@ void ObjectTracer::Impl::trace(std::span<const Ray> rays, std::span<Hit> hits) c
 }
 
 ObjectTracer::ObjectTracer(const RayDevice& device, std::vector<ModelScene> models,
-                           std::vector<PlacedObject> placed, std::vector<MovingObject> moving)
-    : impl_(std::make_shared<Impl>(device, std::move(models), std::move(placed),
-                                   std::move(moving))) {}
+                           std::vector<PlacedObject> placed, std::vector<MovingObject> moving,
+                           std::vector<Sway> sways)
+    : impl_(std::make_shared<Impl>(device, std::move(models), std::move(placed), std::move(moving),
+                                   std::move(sways))) {}
 
 void ObjectTracer::trace(std::span<const Ray> rays, std::span<Hit> hits) const noexcept {
   if (size() == 0) return;
@@ -398,37 +330,6 @@ void ObjectTracer::trace(std::span<const Ray> rays, std::span<Hit> hits) const n
 
 std::size_t ObjectTracer::size() const noexcept {
   return impl_ == nullptr ? 0 : impl_->placed.size() + impl_->moving.size();
-}
-
-bool ObjectTracer::any_moves() const noexcept { return impl_ != nullptr && !impl_->moving.empty(); }
-
-std::uint32_t ObjectTracer::model_of(std::uint32_t object) const noexcept {
-  const std::size_t index = object - 1;
-  return index < impl_->placed.size() ? impl_->placed[index].model
-                                      : impl_->moving[index - impl_->placed.size()].model;
-}
-
-PlacedObject ObjectTracer::placed_at(std::uint32_t object, nanoseconds time) const noexcept {
-  const std::size_t index = object - 1;
-  if (index < impl_->placed.size()) return impl_->placed[index];
-  const MovingObject& moving = impl_->moving[index - impl_->placed.size()];
-  const Pose X_DO = impl_->pose(moving, time);
-  return {X_DO.translation_m, X_DO.rotation, moving.scale, moving.model};
-}
-
-std::span<const ModelScene> ObjectTracer::models() const noexcept {
-  if (impl_ == nullptr) return {};
-  return impl_->models;
-}
-
-glm::dvec3 ObjectTracer::velocity_m_s(std::uint32_t object, const glm::dvec3& p_DQ,
-                                      nanoseconds time) const noexcept {
-  const std::size_t index = object - 1;
-  if (index < impl_->placed.size()) return glm::dvec3(0);
-  const Trajectory& X_DO = impl_->moving[index - impl_->placed.size()].X_DO;
-  if (time < X_DO.begin_time() || X_DO.end_time() < time) return glm::dvec3(0);
-  const auto [linear_m_s, angular_rad_s] = X_DO.velocity_at(time);
-  return linear_m_s + glm::cross(angular_rad_s, p_DQ - X_DO.pose_at(time).translation_m);
 }
 
 }  // namespace groundray

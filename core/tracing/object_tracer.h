@@ -13,6 +13,7 @@
 #include "core/geometry/trajectory.h"
 #include "core/model/model.h"
 #include "core/tracing/ray_tracer.h"
+#include "core/tracing/sway.h"
 
 namespace groundray {
 
@@ -62,6 +63,13 @@ struct MovingObject {
   Trajectory X_DO;
   double scale = 1;
   std::uint32_t model = 0;
+  /// Consecutive objects with the same number, other than 0, are parts of one instance.
+  std::uint32_t body = 0;
+};
+
+/// Consecutive objects: the number of the first, and their count.
+struct ObjectRange {
+  std::uint32_t first = 1, count = 0;
 };
 
 /// Traces rays through objects. Each object is intersected in its own frame O, to which rays are
@@ -74,11 +82,14 @@ class ObjectTracer {
   /// Constructs a tracer without objects.
   ObjectTracer() = default;
   /// Numbers the objects from 1 in the given order, stationary ones first.
+  /// @param sways  empty, or the sway of each model: stationary objects lean about their origin by
+  ///         it. Their poses are those without wind.
   /// @throws Error listing objects with a scale that is not positive, a pose that is not finite, or
   ///         a model that does not exist, and objects that reach beyond 1e9 m from the origin; or
   ///         with Embree's message if Embree fails.
   ObjectTracer(const RayDevice& device, std::vector<ModelScene> models,
-               std::vector<PlacedObject> placed, std::vector<MovingObject> moving);
+               std::vector<PlacedObject> placed, std::vector<MovingObject> moving,
+               std::vector<Sway> sways = {});
 
   /// Finds the first object that each ray hits before the range in `hits`; leaves the other hits
   /// unchanged. Neighbouring rays should be similar, as for RayTracer::trace.
@@ -86,13 +97,25 @@ class ObjectTracer {
   void trace(std::span<const Ray> rays, std::span<Hit> hits) const noexcept;
 
   std::size_t size() const noexcept;  ///< number of objects
-  bool any_moves() const noexcept;
+  bool any_moves() const noexcept;    ///< true if any object moves or sways
+  /// Returns the number, from 1, of the instance that an object is, or is a part of.
+  std::uint32_t instance_of(std::uint32_t object) const noexcept;
+  /// Returns the objects of which an instance consists.
+  /// @param instance  its number, from 1.
+  ObjectRange parts_of(std::uint32_t instance) const noexcept;
+  /// Returns the object of an instance to which a point of its surface belongs.
+  /// @param normal  of the surface there, unit.
+  std::uint32_t part_at(std::uint32_t instance, const glm::dvec3& p_DQ, const glm::dvec3& normal,
+                        std::chrono::nanoseconds time) const noexcept;
   /// Returns the index, in models(), of an object's model.
   /// @param object  its number, from 1.
   std::uint32_t model_of(std::uint32_t object) const noexcept;
   /// Returns the pose, scale and model of an object at a time.
   /// @param object  its number, from 1.
   PlacedObject placed_at(std::uint32_t object, std::chrono::nanoseconds time) const noexcept;
+  /// Returns how a stationary object leans at a time, about its origin.
+  /// @param object  its number, from 1.
+  Lean lean(std::uint32_t object, std::chrono::nanoseconds time) const noexcept;
   std::span<const ModelScene> models() const noexcept;
   /// Returns the velocity of a point that is fixed to an object, m/s in D; 0 while the object
   /// stands still.

@@ -21,9 +21,10 @@ GroundCover::Point ground_point(const Scene& scene, const Ray& ray, const Hit& h
 }
 
 // Point of an object that a ray hit, in the object's frame O, and the surface patch that the ray
-// covers there.
+// covers there; of a plant that leans, as if it were upright.
 struct ModelPoint {
   const ModelScene& model;
+  Lean lean;
   glm::dquat R_DO;
   glm::dvec3 p_O;
   glm::dvec3 normal_O;
@@ -33,10 +34,17 @@ ModelPoint model_point(const ObjectTracer& objects, const Ray& ray, const Hit& h
                        double width_m) noexcept {
   const PlacedObject object = objects.placed_at(hit.object, ray.time);
   const glm::dquat R_OD = glm::conjugate(object.R_DO);
-  const glm::dvec3 p_DQ = ray.origin + ray.direction * hit.range_m;
-  const glm::dvec3 normal = glm::normalize(glm::dvec3(hit.normal));
-  const SurfacePatch patch = surface_patch(width_m, ray.direction, normal);
+  glm::dvec3 p_DQ = ray.origin + ray.direction * hit.range_m;
+  glm::dvec3 normal = glm::normalize(glm::dvec3(hit.normal));
+  SurfacePatch patch = surface_patch(width_m, ray.direction, normal);
+  const Lean lean = objects.lean(hit.object, ray.time);
+  if (lean) {
+    p_DQ = object.p_DO + lean.upright(p_DQ - object.p_DO);
+    normal = glm::normalize(lean.upright_normal(normal));
+    patch = {lean.upright(patch.a_m), lean.upright(patch.b_m)};
+  }
   return {objects.models()[object.model],
+          lean,
           object.R_DO,
           R_OD * (p_DQ - object.p_DO) / object.scale,
           R_OD * normal,
@@ -83,7 +91,7 @@ SurfaceTruth Scene::truth_of(const Ray& ray, const Hit& hit) const noexcept {
   }
   const std::uint32_t model = objects.model_of(hit.object);
   const std::uint16_t surface = objects.models()[model].model().surface_of[hit.part];
-  return {models[model].label, hit.object, models[model].materials[surface]};
+  return {models[model].label, objects.instance_of(hit.object), models[model].materials[surface]};
 }
 
 bool Scene::is_plain() const noexcept {
@@ -109,9 +117,10 @@ SeenSurface Scene::look_at(const Ray& ray, const Hit& hit, double width_m,
                            Filtering filtering) const noexcept {
   if (hit.object != 0) {
     const ModelPoint at = model_point(objects, ray, hit, width_m);
-    return {
-        appearance_at(*this, ray, hit, at, filtering),
-        at.R_DO * at.model.shading_normal(hit.part, at.p_O, at.normal_O, at.patch_O, filtering)};
+    glm::dvec3 shading_normal =
+        at.R_DO * at.model.shading_normal(hit.part, at.p_O, at.normal_O, at.patch_O, filtering);
+    if (at.lean) shading_normal = glm::normalize(at.lean.leaning_normal(shading_normal));
+    return {appearance_at(*this, ray, hit, at, filtering), shading_normal};
   }
   if (cover.empty()) return {of_material(terrain.material), glm::normalize(glm::dvec3(hit.normal))};
   const GroundCover::Point point = ground_point(*this, ray, hit);

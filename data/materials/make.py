@@ -288,27 +288,36 @@ def make_retro_reflector() -> None:
 HEADER = "Made by make.py; format: docs/reference/materials.md.\ngroundray_material: 1\n"
 
 
-def make_wet_soil(library: Earthlib) -> None:
+def make_wet_soils(library: Earthlib) -> None:
     spectra = library.spectra(LEVEL_3="soil", SOURCE="icraf-isric-soil-database")
     wavelengths = [nm for nm in EARTHLIB_NM if nm <= 1100]
     means = [statistics.fmean(column) for column in zip(*spectra, strict=True)][: len(wavelengths)]
-    (HERE / "wet_soil.yaml").write_text(
-        f"# Computed, not measured: dry_soil under a film of water. {HEADER}"
-        "name: wet_soil\n"
-        "spectrum:\n"
-        f"  wavelengths_nm: {flow(wavelengths, 0)}\n"
-        f"  reflectances: {flow(means, 4)}\n"
-        "coat:\n"
-        "  refractive_index: 1.33\n"
-        "  alpha: 0.3\n"
-        "sources:\n"
-        "  spectrum: 'dry_soil, up to 1100 nm: beyond, water absorbs, which this model leaves "
-        "out'\n"
-        "  refractive_index: 'water, 1.333 at 550 nm to 1.328 at 900 nm: Hale and Querry, Applied "
-        "Optics 12, 555 (1973)'\n"
-        "  alpha: 'a choice of this file, not a measurement: standing films have less, damp clods "
-        "more'\n"
-    )
+    for name, film, alpha, choice in (
+        ("wet_soil", "a film of water", 0.3, "standing films have less, damp clods more"),
+        (
+            "puddle",
+            "standing water",
+            0.053,
+            "the mean square slope of the sea in still air, 0.0028 (Cox and Munk, J. Opt. Soc. Am. "
+            "44, 838, 1954), though puddles are no sea",
+        ),
+    ):
+        (HERE / f"{name}.yaml").write_text(
+            f"# Computed, not measured: dry_soil under {film}. {HEADER}"
+            f"name: {name}\n"
+            "spectrum:\n"
+            f"  wavelengths_nm: {flow(wavelengths, 0)}\n"
+            f"  reflectances: {flow(means, 4)}\n"
+            "coat:\n"
+            "  refractive_index: 1.33\n"
+            f"  alpha: {alpha}\n"
+            "sources:\n"
+            "  spectrum: 'dry_soil, up to 1100 nm: beyond, water absorbs, which this model leaves "
+            "out'\n"
+            "  refractive_index: 'water, 1.333 at 550 nm to 1.328 at 900 nm: Hale and Querry, "
+            "Applied Optics 12, 555 (1973)'\n"
+            f"  alpha: 'a choice of this file, not a measurement: {choice}'\n"
+        )
 
 
 def make_broad_leaf() -> None:
@@ -373,7 +382,7 @@ if __name__ == "__main__":
         sys.exit(__doc__)
     earthlib = Earthlib(Path(sys.argv[2]))
     make_earthlib(earthlib)
-    make_wet_soil(earthlib)
+    make_wet_soils(earthlib)
     make_ecostress(Path(sys.argv[1]))
     make_broad_leaf()
     make_metals()

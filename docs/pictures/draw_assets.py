@@ -2,7 +2,8 @@
 
     pip install numpy pillow plyfile
     g++ -std=c++20 -O2 -ffp-contract=off -I. docs/export_assets.cpp \
-        terrain/assets/asset*.cpp core/random.cpp core/error.cpp -lfmt -o export_assets
+        build/release/terrain/libgroundray_terrain.a build/release/core/libgroundray_core.a \
+        -lfmt -lsleef -o export_assets
     mkdir assets && ./export_assets assets
     python3 docs/pictures/draw_assets.py assets docs/pictures/assets.png
 """
@@ -29,6 +30,24 @@ NAMES = [
     "person_cylinder",
     "calibration_board",
     "sphere_target",
+    "spruce",
+    "pine",
+    "birch",
+    "oak",
+    "bush",
+    "snag",
+    "fern",
+    "reed",
+    "grass_patch",
+    "fallen_log",
+    "stump",
+    "pickup",
+    "ugv",
+    "tractor",
+    "fence",
+    "sign",
+    "hay_bale",
+    "boulder",
 ]
 
 
@@ -96,7 +115,7 @@ def draw(stem: pathlib.Path) -> Image.Image:
 def main() -> None:
     folder = pathlib.Path(sys.argv[1])
     columns = 4
-    sheet = Image.new("RGB", (columns * TILE, len(NAMES) // columns * TILE), "white")
+    sheet = Image.new("RGB", (columns * TILE, -(-len(NAMES) // columns) * TILE), "white")
     for i, name in enumerate(NAMES):
         sheet.paste(draw(folder / name), (i % columns * TILE, i // columns * TILE))
     sheet.quantize(160).save(sys.argv[2], optimize=True)

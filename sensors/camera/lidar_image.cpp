@@ -30,11 +30,11 @@ struct Columns {
         ny(cloud.column<float>("ny")),
         nz(cloud.column<float>("nz")),
         time_s(cloud.column<float>("time")),
-        object(cloud.column<std::uint32_t>("instance")) {}
+        instance(cloud.column<std::uint32_t>("instance")) {}
 
   std::span<const double> x, y, z, range_m;
   std::span<const float> nx, ny, nz, time_s;
-  std::span<const std::uint32_t> object;
+  std::span<const std::uint32_t> instance;
 };
 
 // Returns a ray that hits whatever hides a point from the camera, but not the point's own surface.
@@ -64,7 +64,11 @@ class Imaging {
     for (std::size_t i = begin; i < end; ++i) {
       const glm::dvec3 p_DQ(echoes_.x[i], echoes_.y[i], echoes_.z[i]);
       const nanoseconds time = stamp_ + nanoseconds(std::llround(1e9 * double{echoes_.time_s[i]}));
-      const Mover point(scene_.objects, echoes_.object[i], p_DQ, time);
+      const glm::dvec3 normal(echoes_.nx[i], echoes_.ny[i], echoes_.nz[i]);
+      const std::uint32_t instance = echoes_.instance[i];
+      const std::uint32_t object =
+          instance == 0 ? 0 : scene_.objects.part_at(instance, p_DQ, normal, time);
+      const Mover point(scene_.objects, object, p_DQ, time);
       const auto seen = observe(camera_, X_DC_, begin_, point, row);
       if (!seen) continue;
       row = seen->pixel.y;
@@ -74,8 +78,7 @@ class Imaging {
                         .depth_m = (glm::conjugate(seen->X_DC.rotation) * seen->towards).z,
                         .is_inside = is_inside(camera_.spec().size_px, seen->pixel)});
       if (!imaged.back().is_inside) continue;
-      const glm::dvec3 normal(echoes_.nx[i], echoes_.ny[i], echoes_.nz[i]);
-      const Mover tip(scene_.objects, echoes_.object[i], p_DQ + normal, time);
+      const Mover tip(scene_.objects, object, p_DQ + normal, time);
       const glm::dvec3 turned = tip.seen_from(seen->X_DC.translation_m, seen->time) - seen->towards;
       inside.push_back(imaged.size() - 1);
       rays.push_back(towards(*seen, turned, echoes_.range_m[i]));

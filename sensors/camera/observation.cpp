@@ -12,7 +12,9 @@ Mover::Mover(const ObjectTracer& objects, std::uint32_t object, const glm::dvec3
     : objects_(objects), object_(object), is_sky_(false), p_(p_DQ) {
   if (object_ == 0) return;
   const PlacedObject now = objects_.placed_at(object_, time);
-  p_ = glm::conjugate(now.R_DO) * (p_ - now.p_DO);
+  p_ -= now.p_DO;
+  if (const Lean lean = objects_.lean(object_, time)) p_ = lean.upright(p_);
+  p_ = glm::conjugate(now.R_DO) * p_;
 }
 
 Mover::Mover(const ObjectTracer& objects, const Ray& ray, const Hit& hit)
@@ -25,7 +27,9 @@ glm::dvec3 Mover::seen_from(const glm::dvec3& p_DC, nanoseconds time) const noex
   if (is_sky_) return p_;
   if (object_ == 0) return p_ - p_DC;
   const PlacedObject then = objects_.placed_at(object_, time);
-  return then.p_DO + then.R_DO * p_ - p_DC;
+  glm::dvec3 arm = then.R_DO * p_;
+  if (const Lean lean = objects_.lean(object_, time)) arm = lean.leaning(arm);
+  return then.p_DO + arm - p_DC;
 }
 
 std::optional<Observation> observe(const Camera& camera, const Trajectory& X_DC, nanoseconds begin,

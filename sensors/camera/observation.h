@@ -34,7 +34,7 @@ class Mover {
   const ObjectTracer& objects_;
   std::uint32_t object_;
   bool is_sky_;
-  glm::dvec3 p_;  // in D, or in the object's frame at D's scale; for sky, the direction
+  glm::dvec3 p_;  // in D, or in the upright object's frame at D's scale; for sky, the direction
 };
 
 /// Observation of a point by an image.

@@ -86,6 +86,36 @@ glm::dvec3 irradiance_of(const HosekWilkie& model) {
   return sum * (pi * pi / (rings * sectors));
 }
 
+// Renders a sky with clouds, and the ground below it.
+ImageF cloudy_dome(const ClearSky& clear, const AnalyticSky& spec, const Sun& clear_sun) {
+  constexpr int width = 2048, height = width / 2;
+  const Clouds clouds(*spec.clouds);
+  Clouds::Lighting lighting{.sun = clear_sun.direction(),
+                            .sun_irradiance = clear_sun.irradiance(),
+                            .sky_irradiance = clear.horizontal_irradiance()};
+  ImageF image(width, height, channels);
+  glm::dvec3 irradiance = clouds.sun_transmittance(lighting.sun) * std::max(lighting.sun.z, 0.0) *
+                          lighting.sun_irradiance;
+  for (int y = 0; y < height; ++y) {
+    const double polar = pi * (y + 0.5) / height;
+    const double level = math::sin(polar), up = math::cos(polar);
+    glm::dvec3 around(0);
+    for (int x = 0; x < width; ++x) {
+      const double azimuth = 2 * pi * ((x + 0.5) / width - 0.5);
+      const glm::dvec3 direction(level * math::sin(azimuth), level * math::cos(azimuth), up);
+      glm::dvec3 radiance = spec.ground_albedo * irradiance / pi;  // known below the horizon
+      if (up > 0) {
+        lighting.clear_radiance = clear.radiance(direction);
+        radiance = clouds.radiance(direction, pi / height, lighting);
+        around += radiance;
+      }
+      for (int c = 0; c < channels; ++c) image.at(x, y)[c] = static_cast<float>(radiance[c]);
+    }
+    if (up > 0) irradiance += around * (level * up * 2 * pi * pi / (double{width} * height));
+  }
+  return image;
+}
+
 ConstantSky checked_sky(const ConstantSky& sky) {
   Violations broken("Constant sky");
   for (int channel = 0; channel < 3; ++channel) {
@@ -160,11 +190,18 @@ DirectionSampler ClearSky::tabulated() const {
   return {grid, std::move(weights)};
 }
 
-Sky::Sky(const SkySpec& spec, ImageF image)
-    : sun_(spec.sun ? std::optional<Sun>(std::in_place, *spec.sun, spec.air) : std::nullopt),
-      dome_(build_dome(spec, std::move(image), sun_)) {}
+std::optional<Sun> sun_of(const SkySpec& spec) {
+  if (!spec.sun) return std::nullopt;
+  const Sun clear(*spec.sun, spec.air);
+  const auto* analytic = std::get_if<AnalyticSky>(&spec.dome);
+  if (!analytic || !analytic->clouds) return clear;
+  return Sun(*spec.sun, spec.air, Clouds(*analytic->clouds).sun_transmittance(clear.direction()));
+}
 
-Sky::Dome Sky::build_dome(const SkySpec& spec, ImageF image, const std::optional<Sun>& sun) {
+Sky::Sky(const SkySpec& spec, ImageF image)
+    : sun_(sun_of(spec)), dome_(build_dome(spec, std::move(image))) {}
+
+Sky::Dome Sky::build_dome(const SkySpec& spec, ImageF image) {
   check_air(spec.air);
   const auto* environment = std::get_if<EnvironmentImage>(&spec.dome);
   Violations broken("SkySpec");
@@ -173,14 +210,17 @@ Sky::Dome Sky::build_dome(const SkySpec& spec, ImageF image, const std::optional
   broken.unless(environment || image.width() == 0,
                 "an image is given, but the dome is not an environment image");
   const auto* analytic = std::get_if<AnalyticSky>(&spec.dome);
-  broken.unless(!analytic || sun, "an analytic sky needs a sun: specify its position");
+  broken.unless(!analytic || spec.sun, "an analytic sky needs a sun: specify its position");
   broken.throw_if_any();
   if (environment) {
     return EnvironmentMap(std::move(image), glm::radians(environment->center_azimuth_deg),
                           environment->scale);
   }
   if (!analytic) return checked_sky(std::get<ConstantSky>(spec.dome));
-  return ClearSky(spec.air.turbidity, analytic->ground_albedo, sun->direction(), sun->irradiance());
+  const Sun sun(*spec.sun, spec.air);
+  ClearSky clear(spec.air.turbidity, analytic->ground_albedo, sun.direction(), sun.irradiance());
+  if (!analytic->clouds) return clear;
+  return EnvironmentMap(cloudy_dome(clear, *analytic, sun), 0, RadianceScale{});
 }
 
 glm::dvec3 Sky::radiance(const glm::dvec3& direction) const noexcept {

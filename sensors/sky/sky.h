@@ -8,6 +8,7 @@
 #include <variant>
 
 #include "core/image/image.h"
+#include "sensors/sky/clouds.h"
 #include "sensors/sky/direction_sampler.h"
 #include "sensors/sky/environment_map.h"
 #include "sensors/sky/sun.h"
@@ -85,10 +86,11 @@ struct EnvironmentImage {
   EnvironmentScale scale;
 };
 
-/// Dome of a clear sky by Hosek and Wilkie with the air's turbidity; it requires a sun above the
-/// horizon.
+/// Dome of a sky by Hosek and Wilkie with the air's turbidity, clear or with clouds; it requires a
+/// sun above the horizon.
 struct AnalyticSky {
-  glm::dvec3 ground_albedo{0.2};  ///< linear sRGB; of the ground below the horizon
+  glm::dvec3 ground_albedo{0.2};    ///< linear sRGB; of the ground below the horizon
+  std::optional<CloudSpec> clouds;  ///< which dim the sun as well
 };
 
 /// Distant light of a scene.
@@ -97,6 +99,10 @@ struct SkySpec {
   std::optional<SunSpec> sun = {};  ///< none if the image contains it, or under clouds
   ClearAir air = {};
 };
+
+/// Returns the sun of a sky, dimmed by its clouds.
+/// @throws Error as Sun and Clouds.
+std::optional<Sun> sun_of(const SkySpec& spec);
 
 /// Distant light of a scene: a dome and, separately, the sun's disc, each with its own sampler. A
 /// path tracer that samples both adds both estimates. Immutable and therefore thread-safe.
@@ -132,7 +138,7 @@ class Sky {
 
  private:
   using Dome = std::variant<ConstantSky, EnvironmentMap, ClearSky>;
-  static Dome build_dome(const SkySpec& spec, ImageF image, const std::optional<Sun>& sun);
+  static Dome build_dome(const SkySpec& spec, ImageF image);
 
   std::optional<Sun> sun_;
   Dome dome_;

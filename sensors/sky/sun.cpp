@@ -259,7 +259,8 @@ glm::dvec3 direct_irradiance_rgb(double elevation_rad, const ClearAir& air) {
   return glm::max(sum, glm::dvec3(0));  // the reddest light near the horizon is outside sRGB
 }
 
-Sun::Sun(const SunSpec& spec, const ClearAir& air) : air_(air) {
+Sun::Sun(const SunSpec& spec, const ClearAir& air, double transmittance)
+    : air_(air), transmittance_(transmittance) {
   check_air(air);
   const SunPosition position = position_of(spec, air);
   direction_ = position.direction;
@@ -267,7 +268,8 @@ Sun::Sun(const SunSpec& spec, const ClearAir& air) : air_(air) {
   elevation_rad_ = math::atan2(direction_.z, math::hypot(direction_.x, direction_.y));
   radius_rad_ = math::asin(math::sin(radius_at_1_au_rad) / distance_au_);
   if (is_up()) {
-    irradiance_ = direct_irradiance_rgb(elevation_rad(), air_) / (distance_au_ * distance_au_);
+    irradiance_ = transmittance * direct_irradiance_rgb(elevation_rad(), air_) /
+                  (distance_au_ * distance_au_);
   }
   const glm::dvec3 aside = std::abs(direction_.z) < 0.5 ? glm::dvec3(0, 0, 1) : glm::dvec3(1, 0, 0);
   across_ = glm::normalize(glm::cross(aside, direction_));
@@ -299,7 +301,7 @@ double Sun::pdf_per_sr(const glm::dvec3& direction) const noexcept {
 
 double solar_irradiance_w_m2_nm(const Sun& sun, double wavelength_nm) {
   const double at_1_au = direct_irradiance_w_m2_nm(wavelength_nm, sun.elevation_rad(), sun.air());
-  return sun.is_up() ? at_1_au / (sun.distance_au() * sun.distance_au()) : 0;
+  return sun.is_up() ? sun.transmittance() * at_1_au / (sun.distance_au() * sun.distance_au()) : 0;
 }
 
 }  // namespace groundray

@@ -107,8 +107,9 @@ struct SunSpec {
 /// below. Immutable and therefore thread-safe.
 class Sun {
  public:
+  /// @param transmittance  share of the light that clouds let pass.
   /// @throws Error listing all values that are out of bounds in `spec` and `air`.
-  Sun(const SunSpec& spec, const ClearAir& air);
+  Sun(const SunSpec& spec, const ClearAir& air, double transmittance = 1);
 
   /// Returns the unit vector to the centre of the disc, axes of W (east, north, up).
   const glm::dvec3& direction() const noexcept { return direction_; }
@@ -148,6 +149,7 @@ class Sun {
             disc_radiance(sine2)};
   }
 
+  double transmittance() const noexcept { return transmittance_; }
   const ClearAir& air() const noexcept { return air_; }
   double distance_au() const noexcept { return distance_au_; }
 
@@ -165,6 +167,7 @@ class Sun {
   }
 
   ClearAir air_;
+  double transmittance_;
   glm::dvec3 direction_;
   double distance_au_;
   double elevation_rad_;

@@ -23,23 +23,51 @@ enum class AssetKind : std::uint8_t {
   Vehicle,
   PersonCylinder,
   CalibrationBoard,
-  SphereTarget
+  SphereTarget,
+  Spruce,
+  Pine,
+  Birch,
+  Oak,
+  Bush,
+  Snag,
+  Fern,
+  Reed,
+  GrassPatch,
+  FallenLog,
+  Stump,
+  Person,
+  Deer,
+  Pickup,
+  Ugv,
+  Tractor,
+  Fence,
+  Sign,
+  HayBale,
+  Boulder
 };
+
+/// Form of the leaves of a shrub or tree: square cards with an image of a spray, for distant
+/// plants, or a small mesh for each leaf or bundle of needles, on twigs that hold it.
+enum class LeafModel : std::uint8_t { Cards, Geometry };
 
 /// Specification of an asset. A member that is not set has the default of its kind
 /// (docs/reference/assets.md). A member that the kind does not have must not be set.
 struct AssetSpec {
   AssetKind kind = AssetKind::Rock;
   /// Largest extent of a rock or stone; height above the ground of a plant, post, person or board;
-  /// span of a wire; length of a vehicle; diameter of a sphere.
+  /// span of a wire; length of a vehicle or log; diameter of a sphere.
   std::optional<double> size_m{};
-  /// Diameter of a post, wire or person; width of a board.
+  /// Diameter of a post, wire, person, log or stump; width of a board; side of a patch.
   std::optional<double> width_m{};
   /// Sag of a wire: depth of its lowest point below its ends; positive.
   std::optional<double> sag_m{};
+  std::optional<double> per_m2{};           ///< blades or stems of a patch
   std::optional<double> square_m{};         ///< side of a board's squares; plain if not set
-  std::optional<double> leaf_area_index{};  ///< of a shrub or tree; see `FoliageArea`
-  Seed seed{};                              ///< variant of a rock, stone or plant; else 0
+  std::optional<double> leaf_area_index{};  ///< of a healthy shrub or tree; see `FoliageArea`
+  LeafModel leaves = LeafModel::Cards;      ///< of a shrub or tree; else as by default
+  /// Fraction of the twigs of a tree that is alive, from 0 to 1. Multiplies the leaf area.
+  std::optional<double> health{};
+  Seed seed{};  ///< variant of a rock, stone or plant; else 0
   /// Number of triangles, as a multiple of the kind's usual number; 1 for vehicles and boards.
   double detail = 1;
 };

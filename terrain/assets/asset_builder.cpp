@@ -106,6 +106,16 @@ std::uint16_t AssetBuilder::add_surface(ModelSurface surface) {
   return static_cast<std::uint16_t>(model_.surfaces.size() - 1);
 }
 
+std::uint16_t AssetBuilder::surface(std::string_view name, const glm::vec3& color) {
+  for (std::size_t i = 0; i < model_.surfaces.size(); ++i) {
+    if (model_.surfaces[i].name == name) return static_cast<std::uint16_t>(i);
+  }
+  ModelSurface surface;
+  surface.name = name;
+  surface.color = color;
+  return add_surface(std::move(surface));
+}
+
 std::uint32_t AssetBuilder::add_vertex(const glm::dvec3& p) {
   assert(model_.normals.empty());
   model_.mesh.vertices_m.push_back(p);
@@ -221,6 +231,18 @@ void AssetBuilder::add_loft(std::span<const glm::dvec3> low, std::span<const glm
     const std::uint32_t a = first + i, b = first + (i + 1) % k;
     add_triangle(a, b, b + k, surface);
     add_triangle(a, b + k, a + k, surface);
+  }
+}
+
+void AssetBuilder::append(const Model& part, const Pose& pose) {
+  const auto first = static_cast<std::uint32_t>(model_.mesh.vertices_m.size());
+  for (const glm::dvec3& p : part.mesh.vertices_m) model_.mesh.vertices_m.push_back(pose * p);
+  for (const glm::vec3& normal : part.normals)
+    model_.normals.emplace_back(pose.rotation * glm::dvec3(normal));
+  for (std::size_t i = 0; i < part.mesh.triangles.size(); ++i) {
+    const ModelSurface& worn = part.surfaces[part.surface_of[i]];
+    const glm::uvec3 corners = part.mesh.triangles[i] + first;
+    add_triangle(corners.x, corners.y, corners.z, surface(worn.name, worn.color));
   }
 }
 

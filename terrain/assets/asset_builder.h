@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/geometry/pose.h"
 #include "core/image/image.h"
 #include "core/model/model.h"
 
@@ -44,6 +45,9 @@ class AssetBuilder {
   /// Adds a surface and returns its number.
   std::uint16_t add_surface(ModelSurface surface);
 
+  /// Returns the number of the surface with a name; adds it if there is none.
+  std::uint16_t surface(std::string_view name, const glm::vec3& color);
+
   std::uint32_t add_vertex(const glm::dvec3& p);
   std::uint32_t add_vertex(const glm::dvec3& p, const glm::dvec3& normal, const glm::dvec2& uv);
 
@@ -66,6 +70,9 @@ class AssetBuilder {
   /// concave; both are triangulated by the shape of `low`.
   void add_loft(std::span<const glm::dvec3> low, std::span<const glm::dvec3> high,
                 std::uint16_t surface);
+
+  /// Adds a model that has normals, moved by a pose; surfaces of the same name become one.
+  void append(const Model& part, const Pose& pose);
 
   /// Scales all positions about the origin.
   void scale(double factor);

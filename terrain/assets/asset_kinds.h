@@ -49,9 +49,12 @@ class AssetRandom {
 
 /// Valid members of an AssetSpec, completed with the defaults of its kind.
 struct AssetShape {
-  double size_m = 0, width_m = 0, sag_m = 0;
+  double size_m = 0, width_m = 0, sag_m = 0, per_m2 = 0;
   std::optional<double> square_m;
   double leaf_area_index = 0, detail = 1;
+  LeafModel leaves = LeafModel::Cards;
+  double health = 1;
+  Seed seed{};
   AssetRandom random;
 };
 
@@ -68,6 +71,29 @@ Model make_vehicle(AssetShape shape);
 Model make_person_cylinder(AssetShape shape);
 Model make_calibration_board(AssetShape shape);
 Model make_sphere_target(AssetShape shape);
+Model make_spruce(AssetShape shape);
+Model make_pine(AssetShape shape);
+Model make_birch(AssetShape shape);
+Model make_oak(AssetShape shape);
+Model make_bush(AssetShape shape);
+Model make_snag(AssetShape shape);
+Model make_fern(AssetShape shape);
+Model make_reed(AssetShape shape);
+Model make_grass_patch(AssetShape shape);
+Model make_fallen_log(AssetShape shape);
+Model make_stump(AssetShape shape);
+Model make_person(AssetShape shape);
+Model make_deer(AssetShape shape);
+Model make_pickup(AssetShape shape);
+Model make_ugv(AssetShape shape);
+Model make_tractor(AssetShape shape);
+Model make_straight_fence(AssetShape shape);
+Model make_sign(AssetShape shape);
+Model make_hay_bale(AssetShape shape);
+Model make_boulder(AssetShape shape);
+
+/// Returns valid members, completed with the defaults of the kind.
+AssetShape asset_shape(const AssetSpec& spec);
 
 /// Returns the number of squares along a length, from 1 to 1000, or nothing if squares of this side
 /// do not fill it.

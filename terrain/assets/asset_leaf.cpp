@@ -23,7 +23,7 @@ constexpr int image_size = 128;
 constexpr int alpha = 3;
 
 // Leaf or needle: the shape of a lens from its stalk to its tip, in coordinates of the image.
-struct Blade {
+struct DrawnBlade {
   glm::dvec2 stalk;
   double angle_rad;  // from the u axis towards v
   double length;
@@ -33,15 +33,15 @@ struct Blade {
 
 // Draws blades on top of one another. Positions are (u, v); v points up, whereas rows of the image
 // run down.
-class Spray {
+class SprayImage {
  public:
-  Spray() : image_(image_size, image_size, 4) {
+  SprayImage() : image_(image_size, image_size, 4) {
     for (std::size_t i = 0; i < image_.values().size(); ++i) {
       image_.values()[i] = i % 4 == alpha ? 0 : 220;
     }
   }
 
-  void draw(const Blade& blade) {
+  void draw(const DrawnBlade& blade) {
     const glm::dvec2 along{math::cos(blade.angle_rad), math::sin(blade.angle_rad)};
     const glm::dvec2 tip = blade.stalk + along * blade.length;
     const double margin = blade.half_width + 2.0 / image_size;
@@ -63,7 +63,7 @@ class Spray {
   Image8 take() { return std::move(image_); }
 
  private:
-  void draw_pixel(const Blade& blade, const glm::dvec2& along, int i, int j) {
+  void draw_pixel(const DrawnBlade& blade, const glm::dvec2& along, int i, int j) {
     const glm::dvec2 q = (glm::dvec2(i, j) + 0.5) / static_cast<double>(image_size) - blade.stalk;
     const double s = glm::dot(q, along) / blade.length;
     const double off = std::abs(q.y * along.x - q.x * along.y);
@@ -86,7 +86,7 @@ class Spray {
 double rad(double deg) { return deg * std::numbers::pi / 180; }
 
 // Draws a twig with leaves on both sides and one at its end.
-void draw_twig(Spray& spray, const glm::dvec2& from, double angle_deg, double length) {
+void draw_twig(SprayImage& spray, const glm::dvec2& from, double angle_deg, double length) {
   const glm::dvec2 along{math::cos(rad(angle_deg)), math::sin(rad(angle_deg))};
   spray.draw({from, rad(angle_deg), length, 0.01, 0.7});
   constexpr double spacing = 0.085, leaf = 0.19, half_width = 0.046;
@@ -102,10 +102,10 @@ void draw_twig(Spray& spray, const glm::dvec2& from, double angle_deg, double le
 }
 
 // Draws the stalk of the spray, widest where it leaves the image.
-void draw_stalk(Spray& spray) { spray.draw({{0.5, -0.3}, rad(90), 0.6, 0.013, 0.7}); }
+void draw_stalk(SprayImage& spray) { spray.draw({{0.5, -0.3}, rad(90), 0.6, 0.013, 0.7}); }
 
 Image8 draw_leaves() {
-  Spray spray;
+  SprayImage spray;
   draw_stalk(spray);
   draw_twig(spray, {0.5, 0.02}, 92, 0.74);
   draw_twig(spray, {0.5, 0.14}, 38, 0.33);
@@ -116,7 +116,7 @@ Image8 draw_leaves() {
 }
 
 // Draws a shoot with needles on both sides.
-void draw_shoot(Spray& spray, const glm::dvec2& from, double angle_deg, double length) {
+void draw_shoot(SprayImage& spray, const glm::dvec2& from, double angle_deg, double length) {
   const glm::dvec2 along{math::cos(rad(angle_deg)), math::sin(rad(angle_deg))};
   spray.draw({from, rad(angle_deg), length, 0.012, 0.75});
   constexpr double spacing = 0.03, needle = 0.1;
@@ -129,7 +129,7 @@ void draw_shoot(Spray& spray, const glm::dvec2& from, double angle_deg, double l
 }
 
 Image8 draw_needles() {
-  Spray spray;
+  SprayImage spray;
   draw_stalk(spray);
   for (double v = 0.1; v < 0.8; v += 0.15) {
     for (const double side : {-1.0, 1.0}) {

@@ -14,6 +14,7 @@
 #include "core/math.h"
 #include "terrain/assets/asset_builder.h"
 #include "terrain/assets/asset_kinds.h"
+#include "terrain/assets/fracture.h"
 
 namespace groundray {
 namespace {
@@ -152,7 +153,26 @@ int cuts(double at_usual, double detail) {
   return std::max(2, static_cast<int>(std::lround(at_usual * std::sqrt(detail))));
 }
 
-Model boulder(const RockShape& rock, AssetShape shape) {
+// Returns a model of moved vertices, scaled to a largest extent, with a share of its height below
+// the ground.
+Model finished(const Icosphere& moved, std::string_view material, double size_m, double buried) {
+  AssetBuilder builder;
+  const std::uint16_t surface = builder.add_surface(asset_surface(material));
+  glm::dvec3 low(1e9), high(-1e9);
+  for (const glm::dvec3& p : moved.directions) {
+    low = glm::min(low, p);
+    high = glm::max(high, p);
+  }
+  const glm::dvec3 extent = high - low;
+  const double scale = size_m / std::max({extent.x, extent.y, extent.z});
+  const glm::dvec3 origin{(low.x + high.x) / 2, (low.y + high.y) / 2, low.z + buried * extent.z};
+  for (const glm::dvec3& p : moved.directions) builder.add_vertex((p - origin) * scale);
+  for (const glm::uvec3& t : moved.triangles) builder.add_triangle(t.x, t.y, t.z, surface);
+  builder.smooth();
+  return builder.take();
+}
+
+Model fragment(const RockShape& rock, AssetShape shape) {
   const int n = cuts(rock.frequency, shape.detail);
   Icosphere sphere = IcosphereMaker(n).take();
   // Rock fragments have axes of 2 : sqrt 2 : 1 on average (Michikami et al., Icarus 264 (2016)
@@ -160,29 +180,88 @@ Model boulder(const RockShape& rock, AssetShape shape) {
   const glm::dvec3 axes{1, std::numbers::sqrt2 / 2 * shape.random.between(0.85, 1.15),
                         0.5 * shape.random.between(0.8, 1.2)};
   const RockRadius radius(rock, n, shape.random);
-  AssetBuilder builder;
-  const std::uint16_t surface = builder.add_surface(asset_surface(rock.material));
-  glm::dvec3 low(1e9), high(-1e9);
-  for (glm::dvec3& p : sphere.directions) {
-    p *= axes * radius(p);
-    low = glm::min(low, p);
-    high = glm::max(high, p);
-  }
-  const glm::dvec3 extent = high - low;
-  const double scale = shape.size_m / std::max({extent.x, extent.y, extent.z});
-  // A fifth of the height is below the ground.
-  const glm::dvec3 origin{(low.x + high.x) / 2, (low.y + high.y) / 2, low.z + 0.2 * extent.z};
-  for (const glm::dvec3& p : sphere.directions) builder.add_vertex((p - origin) * scale);
-  for (const glm::uvec3& t : sphere.triangles) builder.add_triangle(t.x, t.y, t.z, surface);
-  builder.smooth();
-  return builder.take();
+  for (glm::dvec3& p : sphere.directions) p *= axes * radius(p);
+  return finished(sphere, rock.material, shape.size_m, 0.2);
 }
+
+// Radii of a weathered block of a jointed rock mass: a convex block whose edges are rounded, and
+// waves on it that are no shorter than three edges of the mesh.
+class BlockRadius {
+ public:
+  BlockRadius(double edge_angle, AssetRandom& random) {
+    // Bedding and two sets of joints, the latter nearly at right angles to each other and to it.
+    const auto tilted = [&](const glm::dvec3& normal) {
+      return glm::normalize(normal + 0.16 * random.direction());
+    };
+    const JointSet bedding{tilted({0, 0, 1}), 0.62}, first{tilted({1, 0, 0}), 1};
+    const JointSet second{tilted({0, 1, 0}), 0.8};
+    planes_ =
+        rock_block({.sets = {bedding, first, second}, .scatter_rad = 0.05, .chips = 14}, random);
+    const std::vector<glm::dvec3> corners = corners_of(planes_);
+    for (const glm::dvec3& p : corners) reach_ = glm::max(reach_, glm::abs(p));
+    edge_ = boulder_edge * 2 * std::max({reach_.x, reach_.y, reach_.z});
+    constexpr double longest = 5, ratio = 1.3;
+    const double shortest = 2 * pi / (3 * edge_angle);
+    for (double number = longest; number < shortest; number *= ratio) {
+      for (int i = 0; i < 3; ++i) {
+        const glm::dvec3 direction = random.direction();
+        const double phase = random.angle_rad();
+        waves_.push_back({direction * number, phase, math::pow(number / longest, -0.85)});
+      }
+    }
+    double square = 0;
+    for (const Wave& wave : waves_) square += wave.amplitude * wave.amplitude / 2;
+    for (Wave& wave : waves_) wave.amplitude *= boulder_relief / std::sqrt(square);
+  }
+
+  // Half-extents of the block.
+  const glm::dvec3& reach() const { return reach_; }
+
+  double operator()(const glm::dvec3& direction) const {
+    double low = 0, high = 2 * glm::length(reach_);
+    for (int i = 0; i < 48; ++i) {
+      const double middle = (low + high) / 2;
+      (rounded_level(planes_, edge_, direction * middle) < 0 ? low : high) = middle;
+    }
+    double noise = 0;
+    for (const Wave& wave : waves_)
+      noise += wave.amplitude * math::sin(glm::dot(wave.vector, direction) + wave.phase);
+    return high * math::exp(noise);
+  }
+
+ private:
+  struct Wave {
+    glm::dvec3 vector;
+    double phase;
+    double amplitude;
+  };
+  std::vector<RockPlane> planes_;
+  std::vector<Wave> waves_;
+  glm::dvec3 reach_{0};
+  double edge_ = 0;
+};
 
 }  // namespace
 
-Model make_rock(AssetShape shape) { return boulder({"rock", 8, 22, 0.03}, shape); }
+Model make_rock(AssetShape shape) { return fragment({"rock", 8, 22, 0.03}, shape); }
 
-Model make_stone(AssetShape shape) { return boulder({"gravel", 4, 6, 0.02}, shape); }
+Model make_stone(AssetShape shape) { return fragment({"gravel", 4, 6, 0.02}, shape); }
+
+Model make_boulder(AssetShape shape) {
+  const int n = cuts(20, shape.detail);
+  const BlockRadius radius(math::acos(1 / std::sqrt(5.0)) / n, shape.random);
+  Icosphere sphere = IcosphereMaker(n).take();
+  for (glm::dvec3& p : sphere.directions) {
+    // Directions are spread as the block is, so that its far ends get as many vertices.
+    p = glm::normalize(p * radius.reach());
+    p *= radius(p);
+  }
+  // It lies on its bedding, turned at random, an eighth of its height below the ground.
+  const double yaw = shape.random.angle_rad();
+  const double c = math::cos(yaw), s = math::sin(yaw);
+  for (glm::dvec3& p : sphere.directions) p = {c * p.x - s * p.y, s * p.x + c * p.y, p.z};
+  return finished(sphere, "rock", shape.size_m, 0.125);
+}
 
 Model make_sphere_target(AssetShape shape) {
   const Icosphere sphere = IcosphereMaker(cuts(16, shape.detail)).take();

@@ -80,4 +80,51 @@ void thicken(Skeleton& wood, double foot_radius) {
   for (SkeletonNode& node : wood) node.radius = foot_radius * std::sqrt(double(node.tips) / most);
 }
 
+void prune(Skeleton& wood, const std::vector<char>& is_kept) {
+  std::vector<std::size_t> number(wood.size(), 0);
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < wood.size(); ++i) {
+    if (!is_kept[i]) continue;
+    number[i] = count;
+    wood[count] = wood[i];
+    if (wood[i].parent) wood[count].parent = number[*wood[i].parent];
+    ++count;
+  }
+  wood.resize(count);
+}
+
+void wither(Skeleton& wood, double health, AssetRandom& random) {
+  if (health == 1) return;
+  int most = 1;
+  for (const SkeletonNode& node : wood) most = std::max(most, node.tips);
+  const int small = std::clamp(most / 12, 1, 20);  // twig ends of a branch that dies as a whole
+  constexpr double kept_twigs = 0.3;
+  std::vector<char> is_kept(wood.size(), 1);
+  for (std::size_t i = 0; i < wood.size(); ++i) {
+    if (!wood[i].parent) continue;
+    const SkeletonNode& parent = wood[*wood[i].parent];
+    const bool is_whole = parent.tips <= small && parent.parent.has_value();
+    wood[i].is_alive = is_whole                ? parent.is_alive
+                       : wood[i].tips <= small ? random.between(0, 1) < health
+                                               : parent.is_alive;
+    const bool is_lost =
+        !wood[i].is_alive && wood[i].tips == 1 && random.between(0, 1) > kept_twigs;
+    is_kept[i] = is_kept[*wood[i].parent] != 0 && !is_lost ? 1 : 0;
+  }
+  prune(wood, is_kept);
+}
+
+void break_off(Skeleton& wood, double height, AssetRandom& random) {
+  constexpr double breaks = 0.13;  // chance that a branch breaks at a joint
+  std::vector<char> is_kept(wood.size(), 1);
+  for (std::size_t i = 0; i < wood.size(); ++i) {
+    if (!wood[i].parent) continue;
+    const SkeletonNode& parent = wood[*wood[i].parent];
+    const bool is_stem = wood[i].tips * 2 > parent.tips && !parent.bears_twigs;
+    const bool is_broken = wood[i].p.z > height || (!is_stem && random.between(0, 1) < breaks);
+    is_kept[i] = is_kept[*wood[i].parent] != 0 && !is_broken ? 1 : 0;
+  }
+  prune(wood, is_kept);
+}
+
 }  // namespace groundray

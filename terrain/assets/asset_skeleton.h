@@ -16,6 +16,8 @@ struct SkeletonNode {
   double radius = 0;                  ///< set by `thicken`
   /// Number of twig ends that it carries, itself included if it is one; set by `thicken`.
   int tips = 0;
+  bool bears_twigs = false;  ///< if it is alive
+  bool is_alive = true;
 };
 
 /// Wood of a plant; parents precede their children.
@@ -39,5 +41,16 @@ void colonise(Skeleton& wood, const CrownShape& crown, AssetRandom& random);
 /// Sets the radii by Leonardo's rule: the cross-sections of the pieces of wood that leave a joint
 /// add up to that of the piece that enters it. The thickest foot has the given radius.
 void thicken(Skeleton& wood, double foot_radius);
+
+/// Removes joints, and renumbers the parents of the others. If a joint's parent is removed, the
+/// joint must be removed too.
+void prune(Skeleton& wood, const std::vector<char>& is_kept);
+
+/// Kills twigs so that about a fraction `health` of the small branches is alive, and removes most
+/// of the fine twigs of the dead ones. Does nothing, and draws no random numbers, if `health` is 1.
+void wither(Skeleton& wood, double health, AssetRandom& random);
+
+/// Breaks off the top of a dead tree at a height, and most branches at random joints.
+void break_off(Skeleton& wood, double height, AssetRandom& random);
 
 }  // namespace groundray

@@ -117,16 +117,24 @@ RefinedTiles::RefinedTiles(std::shared_ptr<const TileSource> dem,
     : dem_(std::move(dem)),
       relief_(std::move(relief)),
       lattice_{relief_->frame().samples, dem_->lattice().block_cells} {
-  const auto root = dem_->tile({dem_->lattice().top_level(), {0, 0}});
+  const int top = dem_->lattice().top_level();
+  const auto root = dem_->tile({top, {0, 0}});
   const Relief::Node span = relief_->node(relief_->exponent(), {0, 0});
-  rounding_m_ = Relief::rounding_m(lower(static_cast<double>(root->low_m[0]) + span.low_m),
-                                   higher(static_cast<double>(root->high_m[0]) + span.high_m));
+  TrailNodes::Change change;
+  if (relief_->trails() != nullptr) {
+    trails_.emplace(*dem_, *relief_, lattice_);
+    change = trails_->change(lattice_.top_level(), {0, 0});
+  }
+  rounding_m_ = Relief::rounding_m(
+      lower(static_cast<double>(root->low_m[0]) + span.low_m + change.low_m),
+      higher(static_cast<double>(root->high_m[0]) + span.high_m + change.high_m));
 }
 
 float RefinedTiles::max_key_m(int level) const {
   const int coarser = level - relief_->exponent();
   const double dem_m = coarser < 0 ? 0 : dem_->max_key_m(coarser);
-  return rounded_up(dem_m + relief_->max_key_m(level) + rounding_m_);
+  const double without_m = dem_m + relief_->max_key_m(level) + rounding_m_;
+  return trails_ ? trails_->max_key_m(level, without_m) : rounded_up(without_m);
 }
 
 // Returns the tile of the DEM from which a tile is computed.
@@ -137,10 +145,12 @@ TileName RefinedTiles::below(const TileName& name) const noexcept {
 }
 
 std::shared_ptr<const Tile> RefinedTiles::tile(const TileName& name) const {
-  return name.level < relief_->exponent() ? finer_tile(name) : displaced_tile(name);
+  auto tile = name.level < relief_->exponent() ? finer_tile(name) : displaced_tile(name);
+  if (trails_) add_trails(name, *tile);
+  return tile;
 }
 
-std::shared_ptr<const Tile> RefinedTiles::finer_tile(const TileName& name) const {
+std::shared_ptr<Tile> RefinedTiles::finer_tile(const TileName& name) const {
   auto tile = empty_tile(lattice_, name);
   const TileName from = below(name);
   const std::shared_ptr<const Tile> dem = dem_->tile(from);
@@ -166,13 +176,12 @@ std::shared_ptr<const Tile> RefinedTiles::finer_tile(const TileName& name) const
   return tile;
 }
 
-std::shared_ptr<const Tile> RefinedTiles::displaced_tile(const TileName& name) const {
+std::shared_ptr<Tile> RefinedTiles::displaced_tile(const TileName& name) const {
   auto tile = empty_tile(lattice_, name);
   const TileName from = below(name);
   const std::shared_ptr<const Tile> dem = dem_->tile(from);
   for_each_point(lattice_, name, [&](std::size_t at, glm::ivec2 sample) {
-    tile->heights_m[at] = static_cast<float>(static_cast<double>(dem->heights_m[at]) +
-                                             relief_->displacement_m(sample));
+    tile->heights_m[at] = relief_->height_m(static_cast<double>(dem->heights_m[at]), sample);
   });
   Relief::Node span = relief_->node(name.level, {0, 0});
   for (std::size_t at = 0; at < tile->key_m.size(); ++at) {
@@ -189,6 +198,33 @@ std::shared_ptr<const Tile> RefinedTiles::displaced_tile(const TileName& name) c
     tile->full_m[at] = name.level == 0 ? 0 : raised(dem->full_m[at], span.full_m);
   }
   return tile;
+}
+
+// Replaces or widens the values of the nodes that trails change.
+void RefinedTiles::add_trails(const TileName& name, Tile& tile) const {
+  const glm::ivec2 first = name.which * Tile::nodes;
+  const glm::ivec2 count = glm::min(glm::ivec2(Tile::nodes), lattice_.nodes(name.level) - first);
+  for (int y = 0; y < count.y; ++y) {
+    for (int x = 0; x < count.x; ++x) {
+      const glm::ivec2 node = first + glm::ivec2(x, y);
+      const std::size_t at = value_index({x, y}, Tile::nodes);
+      if (name.level < TrailNodes::exact_levels) {
+        const auto exact = trails_->node(name.level, node);
+        if (!exact) continue;
+        tile.key_m[at] = exact->key_m;
+        tile.deviation_m[at] = exact->deviation_m;
+        tile.full_m[at] = exact->full_m;
+        tile.low_m[at] = exact->low_m;
+        tile.high_m[at] = exact->high_m;
+      } else if (tile.key_m[at] >= 0) {
+        const auto [low_m, high_m] = trails_->change(name.level, node);
+        for (float* bound_m : {&tile.key_m[at], &tile.deviation_m[at], &tile.full_m[at]})
+          *bound_m = rounded_up(*bound_m + (high_m - low_m));
+        tile.low_m[at] = lower(tile.low_m[at] + low_m);
+        tile.high_m[at] = higher(tile.high_m[at] + high_m);
+      }
+    }
+  }
 }
 
 void RefinedTiles::prefetch(std::span<const TileName> names) const {

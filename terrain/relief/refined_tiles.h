@@ -1,9 +1,11 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 
 #include "terrain/lod/tile_source.h"
 #include "terrain/relief/relief.h"
+#include "terrain/relief/trail_nodes.h"
 
 namespace groundray {
 
@@ -16,6 +18,7 @@ namespace groundray {
 ///    exactly as the displacement does, apart from the rounding of heights to float;
 ///  - from the DEM's cells on, the bound is the deviation of the DEM's node, plus the range of the
 ///    displacement, plus rounding.
+/// Nodes that trails change have values of their own (TrailNodes).
 class RefinedTiles final : public TileSource {
  public:
   RefinedTiles(std::shared_ptr<const TileSource> dem, std::shared_ptr<const Relief> relief);
@@ -27,12 +30,14 @@ class RefinedTiles final : public TileSource {
 
  private:
   TileName below(const TileName& name) const noexcept;
-  std::shared_ptr<const Tile> finer_tile(const TileName& name) const;
-  std::shared_ptr<const Tile> displaced_tile(const TileName& name) const;
+  std::shared_ptr<Tile> finer_tile(const TileName& name) const;
+  std::shared_ptr<Tile> displaced_tile(const TileName& name) const;
+  void add_trails(const TileName& name, Tile& tile) const;
 
   std::shared_ptr<const TileSource> dem_;
   std::shared_ptr<const Relief> relief_;
   Lattice lattice_;
+  std::optional<TrailNodes> trails_;
   double rounding_m_ = 0;  // bound for all heights
 };
 

@@ -12,6 +12,7 @@
 #include "terrain/lod/deviation.h"
 #include "terrain/lod/passes/node_arrays.h"
 #include "terrain/relief/periodic_image.h"
+#include "terrain/trail/trails.h"
 
 namespace groundray {
 namespace {
@@ -61,7 +62,8 @@ void check_relief(const ReliefSpec& spec) {
   broken.unless(is_length(spec.cell_m), "cell_m = {} must be positive", spec.cell_m);
   broken.unless(is_length(spec.period_m) && spec.period_m <= 1e6,
                 "period_m = {:g} must be positive and at most 1e6", spec.period_m);
-  broken.unless(spec.image || spec.fractal, "it needs an image, a fractal or both");
+  broken.unless(spec.image || spec.fractal || !spec.trails.empty(),
+                "it needs an image, a fractal or trails");
   if (spec.image) check_image_relief(*spec.image, spec.cell_m, broken);
   if (spec.fractal) {
     check_fractal(*spec.fractal, spec.cell_m, broken);
@@ -200,11 +202,35 @@ void Relief::certify_period() {
   }
 }
 
-float Relief::height_m(const Cell& dem, glm::ivec2 sample) const noexcept {
+std::shared_ptr<const Relief> Relief::with_trails(std::span<const TrailSpec> specs,
+                                                  const Trail::GroundHeight& dem,
+                                                  glm::dvec2 origin_w_m) const {
+  const glm::dvec2 cell_m = glm::abs(frame_.step_m);
+  auto relief = std::make_shared<Relief>(*this);
+  if (!specs.empty())
+    relief->trails_ =
+        std::make_shared<const Trails>(specs, dem, origin_w_m, std::max(cell_m.x, cell_m.y));
+  return relief;
+}
+
+double Relief::dem_height_m(const Cell& dem, glm::ivec2 sample) const noexcept {
   const double per_side = 1.0 / (1 << exponent_);
   const int x = sample.x - (dem.column << exponent_), y = sample.y - (dem.row << exponent_);
-  return static_cast<float>(facet_height_m(dem, x * per_side, y * per_side) +
-                            displacement_m(sample));
+  return facet_height_m(dem, x * per_side, y * per_side);
+}
+
+float Relief::height_m(double dem_m, glm::ivec2 sample) const noexcept {
+  const double relief_m = displacement_m(sample);
+  return static_cast<float>(trails_ ? trails_->height_m(frame_.to_D(sample), dem_m, relief_m)
+                                    : dem_m + relief_m);
+}
+
+float Relief::height_m(const Cell& dem, glm::ivec2 sample) const noexcept {
+  return height_m(dem_height_m(dem, sample), sample);
+}
+
+float Relief::height_without_trails_m(const Cell& dem, glm::ivec2 sample) const noexcept {
+  return static_cast<float>(dem_height_m(dem, sample) + displacement_m(sample));
 }
 
 HeightGrid Relief::refined(const HeightGrid& dem) const {
@@ -250,7 +276,8 @@ std::uint64_t Relief::fingerprint() const noexcept {
   const auto bytes = [](const auto& of) {
     return std::string_view(reinterpret_cast<const char*>(of.data()), of.size() * sizeof(of[0]));
   };
-  return byte_hash(bytes(values)) ^ std::rotl(byte_hash(bytes(shape)), 1);
+  return byte_hash(bytes(values)) ^ std::rotl(byte_hash(bytes(shape)), 1) ^
+         (trails_ ? std::rotl(trails_->fingerprint(), 2) : 0);
 }
 
 }  // namespace groundray

@@ -3,7 +3,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <glm/vec2.hpp>
+#include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "core/geometry/cell.h"
@@ -12,8 +14,11 @@
 #include "core/image/image.h"
 #include "terrain/lod/lattice.h"
 #include "terrain/relief/fractal_field.h"
+#include "terrain/trail/trail.h"
 
 namespace groundray {
+
+class Trails;
 
 /// Relief from a displacement image: amplitude_m (value - middle), where value is the first
 /// channel.
@@ -32,12 +37,14 @@ struct ReliefSpec {
   double period_m = 50;  ///< smallest distance after which the relief repeats
   std::optional<ImageRelief> image;
   std::optional<FractalSpec> fractal;
+  std::vector<TrailSpec> trails;  ///< in W, each over those before it
 };
 
 /// Relief on the fine lattice of a DEM. Every cell of the DEM is divided into 2^exponent x
 /// 2^exponent fine cells. The height of a fine sample is that of the DEM's surface there plus a
-/// displacement that is periodic in both directions. The fine samples, rounded to float, define the
-/// reference surface (docs/reference/relief.md). Immutable; any number of threads may use one.
+/// displacement that is periodic in both directions, both changed by trails. The fine samples,
+/// rounded to float, define the reference surface (docs/reference/relief.md). Immutable; any number
+/// of threads may use one.
 class Relief {
  public:
   /// @param dem           grid of the DEM's samples.
@@ -45,6 +52,14 @@ class Relief {
   /// @throws Error listing every field of `spec` that is out of bounds; if the period takes more
   ///         memory, or if the fine lattice has more than 2^26 cells on a side.
   Relief(const ReliefSpec& spec, const GridFrame& dem, std::size_t memory_bytes);
+
+  /// Returns the relief with trails, or a copy if there are none.
+  /// @param dem         heights of the DEM's surface.
+  /// @param origin_w_m  position of D in W.
+  /// @throws Error as Trail.
+  std::shared_ptr<const Relief> with_trails(std::span<const TrailSpec> specs,
+                                            const Trail::GroundHeight& dem,
+                                            glm::dvec2 origin_w_m) const;
 
   /// Returns the grid of the fine samples in D.
   const GridFrame& frame() const noexcept { return frame_; }
@@ -63,6 +78,13 @@ class Relief {
   /// that the surface there depends on is missing.
   /// @param dem  cell of the DEM that contains the sample, possibly on its boundary.
   float height_m(const Cell& dem, glm::ivec2 sample) const noexcept;
+  /// Returns the same without the trails.
+  float height_without_trails_m(const Cell& dem, glm::ivec2 sample) const noexcept;
+  /// Returns the height of a fine sample, from that of the DEM's surface there.
+  float height_m(double dem_m, glm::ivec2 sample) const noexcept;
+
+  /// Returns the trails, or null.
+  const Trails* trails() const noexcept { return trails_.get(); }
 
   /// Returns the whole fine surface.
   HeightGrid refined(const HeightGrid& dem) const;
@@ -87,12 +109,14 @@ class Relief {
 
  private:
   void certify_period();
+  double dem_height_m(const Cell& dem, glm::ivec2 sample) const noexcept;
 
   int exponent_ = 0;
   GridFrame frame_;
   HeightArray displacement_;
   Node whole_;                     // for nodes without values of their own
   std::vector<NodeLevel> levels_;  // levels whose nodes have values of their own
+  std::shared_ptr<const Trails> trails_;
 };
 
 }  // namespace groundray

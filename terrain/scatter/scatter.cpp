@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <functional>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <iterator>
@@ -50,6 +51,11 @@ void check_scatter(const ScatterSpec& spec) {
                 spec.slope_deg.high);
   broken.unless(spec.scale.low > 0 && is_finite_range(spec.scale),
                 "scale = [{}, {}] must be positive and finite", spec.scale.low, spec.scale.high);
+  if (spec.scales) {
+    const auto& [shape, scale] = *spec.scales;
+    broken.unless(shape > 0 && scale > 0 && std::isfinite(shape + scale),
+                  "scales = {{shape {}, scale {}}} must be positive and finite", shape, scale);
+  }
   broken.unless(is_finite_range(spec.yaw_deg), "yaw_deg = [{}, {}] must be finite",
                 spec.yaw_deg.low, spec.yaw_deg.high);
   broken.unless(std::isfinite(spec.sink_m), "sink_m = {} must be finite", spec.sink_m);
@@ -59,6 +65,21 @@ void check_scatter(const ScatterSpec& spec) {
                 "weights must be finite and 0 or more, at least one of them positive");
   broken.unless(std::isfinite(spec.origin_w_m.x + spec.origin_w_m.y),
                 "origin_w_m = ({}, {}) must be finite", spec.origin_w_m.x, spec.origin_w_m.y);
+  if (spec.rows) {
+    const Rows& rows = *spec.rows;
+    broken.unless(
+        rows.between_m > 0 && rows.within_m > 0 && std::isfinite(rows.between_m + rows.within_m),
+        "rows: spacing_m = [{}, {}] must be positive and finite", rows.between_m, rows.within_m);
+    broken.unless(std::isfinite(rows.azimuth_deg), "rows: azimuth_deg = {} must be finite",
+                  rows.azimuth_deg);
+    broken.unless(
+        rows.jitter_m >= 0 && rows.jitter_m <= std::min(rows.between_m, rows.within_m) / 2,
+        "rows: jitter_m = {} must be from 0 to half of the smaller spacing", rows.jitter_m);
+    broken.unless(spec.min_distance_m == 0,
+                  "min_distance_m = {} has no meaning in rows, whose spacing_m is the distance; "
+                  "remove one of them",
+                  spec.min_distance_m);
+  }
   broken.throw_if_any();
 }
 
@@ -83,12 +104,6 @@ double cell_side_m(double darts_per_m2, double min_distance_m) {
   return std::max(min_distance_m, math::exp2(std::floor(math::log2(8 / darts_per_m2) / 2)));
 }
 
-Area area_of(const GridFrame& frame) {
-  const glm::dvec2 a = frame.to_D({0, 0});
-  const glm::dvec2 b = frame.to_D(frame.samples - 1);
-  return {glm::min(a, b), glm::max(a, b)};
-}
-
 std::uint64_t placement_key(glm::ivec2 cell, std::uint32_t number) {
   const auto bits = [](std::int64_t index) { return static_cast<std::uint64_t>(index + max_cell); };
   return bits(cell.y) << 35 | bits(cell.x) << 6 | number;
@@ -103,8 +118,20 @@ std::uint64_t placement_key(glm::ivec2 cell, std::uint32_t number) {
 
 }  // namespace
 
+Area area_of(const GridFrame& frame) {
+  const glm::dvec2 a = frame.to_D({0, 0});
+  const glm::dvec2 b = frame.to_D(frame.samples - 1);
+  return {glm::min(a, b), glm::max(a, b)};
+}
+
 glm::dquat tilt_to(const glm::dvec3& normal) {
   return glm::normalize(glm::dquat(1 + normal.z, -normal.y, normal.x, 0));
+}
+
+double Weibull::quantile(double share, const Interval& interval) const {
+  const double most = -math::expm1(-math::pow((interval.high - interval.low) / scale, shape));
+  const double value = interval.low + scale * math::pow(-math::log1p(-share * most), 1 / shape);
+  return std::clamp(value, interval.low, interval.high);
 }
 
 struct Scatter::Impl {
@@ -129,7 +156,13 @@ struct Scatter::Impl {
   std::optional<Footing> footing_at(glm::dvec2 p) const;
   // Returns the plants of a tile of cells.
   std::vector<Placement> tile(glm::ivec2 first, const Area& within) const;
-  Placement placed(const Dart& dart, const Footing& footing) const;
+  // Returns the plants of a row.
+  std::vector<Placement> row(int number, const Area& within) const;
+  Placement placed(glm::ivec2 cell, std::uint32_t number, const Footing& footing) const;
+  // Returns the density at a position on the ground, without clearings.
+  double per_m2_at(glm::dvec2 p) const {
+    return density.per_m2_at(p) * (spec.suitability ? spec.suitability(p) : 1);
+  }
   void refuse_too_many(const Area& within) const;
 
   Ground ground;
@@ -137,6 +170,7 @@ struct Scatter::Impl {
   ScatterSpec spec;
   ClearedGround cleared;
   DartLattice lattice;
+  std::optional<RowLattice> rows;
   Area area;                         // where both ground and density are defined
   glm::dvec2 origin_cell{0};         // cell of D's origin, whole numbers
   glm::dvec2 origin_in_cell_m{0};    // position of D's origin in that cell
@@ -162,6 +196,18 @@ Scatter::Impl::Impl(Ground where, DensityMap wish, const ScatterSpec& wishes, Se
   std::partial_sum(spec.weights.begin(), spec.weights.end(), std::back_inserter(shares_up_to));
   for (double& share : shares_up_to) share /= shares_up_to.back();
   if (density.max_per_m2() == 0) return;
+  if (spec.rows) {
+    lattice = {.seed = seed, .layer = spec.layer};
+    lattice.per_m2 = 1 / (spec.rows->between_m * spec.rows->within_m);
+    rows.emplace(*spec.rows, spec.origin_w_m);
+    if (density.max_per_m2() > lattice.per_m2 * (1 + 1e-9)) {
+      throw Error(
+          "a density of {} plants per m2 is more than rows with sites {} x {} m apart have, {:.5g} "
+          "per m2",
+          density.max_per_m2(), spec.rows->between_m, spec.rows->within_m, lattice.per_m2);
+    }
+    return;
+  }
   const double darts = darts_per_m2(density.max_per_m2(), spec.min_distance_m);
   const double side_m = cell_side_m(darts, spec.min_distance_m);
   lattice = {seed, spec.layer, side_m, darts, spec.min_distance_m};
@@ -190,18 +236,20 @@ std::optional<Scatter::Impl::Footing> Scatter::Impl::footing_at(glm::dvec2 p) co
   return Footing{{p, height_m}, normal};
 }
 
-Placement Scatter::Impl::placed(const Dart& dart, const Footing& footing) const {
-  const glm::dvec4 u = draw(lattice, dart.cell, dart.number, DartDraw::Plant);
+Placement Scatter::Impl::placed(glm::ivec2 cell, std::uint32_t number,
+                                const Footing& footing) const {
+  const glm::dvec4 u = draw(lattice, cell, number, DartDraw::Plant);
   const double half_yaw_rad = radians(share_in(spec.yaw_deg, u.y)) / 2;
   Placement placement;
-  placement.scale = share_in(spec.scale, u.x);
+  placement.scale =
+      spec.scales ? spec.scales->quantile(u.x, spec.scale) : share_in(spec.scale, u.x);
   placement.p_DO = footing.point - glm::dvec3(0, 0, spec.sink_m * placement.scale);
   placement.R_DO = {math::cos(half_yaw_rad), 0, 0, math::sin(half_yaw_rad)};
   if (spec.stance == Stance::OnSlope) placement.R_DO = tilt_to(footing.normal) * placement.R_DO;
   // The first one whose cumulative weight exceeds u.z: never one of weight 0.
   placement.prototype = static_cast<std::uint32_t>(std::ranges::upper_bound(shares_up_to, u.z) -
                                                    shares_up_to.begin());
-  placement.key = placement_key(dart.cell, dart.number);
+  placement.key = placement_key(cell, number);
   return placement;
 }
 
@@ -223,11 +271,26 @@ std::vector<Placement> Scatter::Impl::tile(glm::ivec2 first, const Area& within)
     for (std::size_t k = begin; k < end; ++k) {
       const Dart dart = darts.dart(k);  // a copy: evaluating other darts may move it
       const glm::dvec2 p = place(dart);
-      const double wanted = density.per_m2_at(p) / density.max_per_m2();
+      const double wanted = per_m2_at(p) / density.max_per_m2();
       if (!within.contains(p) || !(dart.chance < wanted) || clearings.contains(p)) continue;
       const auto footing = footing_at(p);
-      if (footing && darts.stands(k)) found.push_back(placed(dart, *footing));
+      if (footing && darts.stands(k)) found.push_back(placed(dart.cell, dart.number, *footing));
     }
+  }
+  return found;
+}
+
+std::vector<Placement> Scatter::Impl::row(int number, const Area& within) const {
+  std::vector<Placement> found;
+  const RowLattice::Range sites = rows->sites_of(within);
+  for (int i = sites.first.x; i < sites.end.x; ++i) {
+    const glm::ivec2 site(i, number);
+    const glm::dvec4 u = draw(lattice, site, 0, DartDraw::Dart);
+    const glm::dvec2 p =
+        rows->site(site) + spec.rows->jitter_m * (2.0 * glm::dvec2(u.x, u.y) - 1.0);
+    if (!within.contains(p) || !(u.z < per_m2_at(p) / lattice.per_m2)) continue;
+    if (cleared.contains(p)) continue;
+    if (const auto footing = footing_at(p)) found.push_back(placed(site, 0, *footing));
   }
   return found;
 }
@@ -250,7 +313,7 @@ void Scatter::Impl::refuse_too_many(const Area& within) const {
   double expected = 0;
   for (int i = 0; i < steps * steps; ++i) {
     const glm::dvec2 p = within.low_m + (glm::dvec2(i % steps, i / steps) + 0.5) * size_m / 256.0;
-    const double per_m2 = density.per_m2_at(p);
+    const double per_m2 = per_m2_at(p);
     if (per_m2 > 0 && !cleared.contains(p) && footing_at(p)) expected += per_m2;
   }
   expected *= all_m2 / (steps * steps);
@@ -264,16 +327,29 @@ std::vector<Placement> Scatter::placements(const Area& area, const PassRunner& r
   const Area within = area & impl_->area;
   if (within.is_empty() || impl_->density.max_per_m2() == 0) return {};
   impl_->refuse_too_many(within);
-  const auto cells = impl_->cells_of(within);
-  const glm::ivec2 first = cells.first, end = cells.second;
-  const glm::ivec2 tiles = (end - first + tile_cells - 1) / tile_cells;
-  std::vector<std::vector<Placement>> found(static_cast<std::size_t>(tiles.x) *
-                                            static_cast<std::size_t>(tiles.y));
+  // Parts of the plane that are searched one by one: rows, or tiles of cells.
+  std::function<std::vector<Placement>(std::size_t)> part;
+  std::size_t parts = 0;
+  if (impl_->rows) {
+    const RowLattice::Range sites = impl_->rows->sites_of(within);
+    parts = static_cast<std::size_t>(sites.end.y - sites.first.y);
+    part = [&, first = sites.first.y](std::size_t index) {
+      return impl_->row(first + static_cast<int>(index), within);
+    };
+  } else {
+    const auto [first, end] = impl_->cells_of(within);
+    const glm::ivec2 tiles = (end - first + tile_cells - 1) / tile_cells;
+    parts = static_cast<std::size_t>(tiles.x) * static_cast<std::size_t>(tiles.y);
+    part = [&, first = first, tiles](std::size_t index) {
+      const glm::ivec2 tile(index % static_cast<std::size_t>(tiles.x),
+                            index / static_cast<std::size_t>(tiles.x));
+      return impl_->tile(first + tile * tile_cells, within);
+    };
+  }
+  std::vector<std::vector<Placement>> found(parts);
   std::atomic<std::size_t> count = 0;
   run_pass(runner, found.size(), [&](std::size_t index) {
-    const glm::ivec2 tile(index % static_cast<std::size_t>(tiles.x),
-                          index / static_cast<std::size_t>(tiles.x));
-    std::vector<Placement> some = impl_->tile(first + tile * tile_cells, within);
+    std::vector<Placement> some = part(index);
     // Beyond the limit, plants are only counted, for the message.
     const std::size_t so_far = count += some.size();
     if (so_far <= max_placements) found[index] = std::move(some);

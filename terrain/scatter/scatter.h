@@ -2,11 +2,13 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <glm/gtc/quaternion.hpp>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "core/random.h"
@@ -14,6 +16,7 @@
 #include "terrain/ground.h"
 #include "terrain/lod/pass.h"
 #include "terrain/scatter/clearing.h"
+#include "terrain/scatter/row_lattice.h"
 
 namespace groundray {
 
@@ -28,20 +31,38 @@ struct Interval {
 /// Orientation of a plant's z axis: along D's, or along the normal of the facet below it.
 enum class Stance : std::uint8_t { Upright, OnSlope };
 
+/// Weibull distribution above the lower end of an interval, cut off at its upper end.
+struct Weibull {
+  double shape = 1;  ///< 1 for an exponential distribution
+  double scale = 1;
+
+  /// Returns the value that a share from 0 to 1 of all values does not exceed.
+  double quantile(double share, const Interval& interval) const;
+};
+
 /// Placement rules of one layer of plants, rocks or other objects.
 struct ScatterSpec {
+  /// Function that returns the share of the plants that grow at a position of D, from 0 to 1. Any
+  /// number of threads call it.
+  using Suitability = std::function<double(glm::dvec2 p_D)>;
+
   std::uint32_t layer = 0;    ///< layers with different numbers are independent of each other
   double min_distance_m = 0;  ///< between any two positions, in plan
+  /// Sites of the plants, instead of random ones. The density then decides how many of the sites
+  /// have plants; it is at most that of the sites.
+  std::optional<Rows> rows;
   Interval slope_deg{0, 90};  ///< angle between the normal of the facet and the vertical
   Interval height_m{-std::numeric_limits<double>::infinity(),
                     std::numeric_limits<double>::infinity()};
-  Interval scale{1, 1};      ///< uniformly distributed
-  Interval yaw_deg{0, 360};  ///< uniformly distributed; about the plant's own z, from x to y
+  Interval scale{1, 1};
+  std::optional<Weibull> scales{};  ///< distribution of `scale`; else uniform
+  Interval yaw_deg{0, 360};         ///< uniformly distributed; about the plant's own z, from x to y
   Stance stance = Stance::Upright;
   double sink_m = 0;               ///< depth in the ground at scale 1, straight down
   std::vector<double> weights{1};  ///< relative frequencies of the prototypes
   std::vector<Clearing> clearings;
-  glm::dvec2 origin_w_m{0};  ///< D's origin in W; if the DEM is cut, plants stay in place in W
+  Suitability suitability{};  ///< empty if plants grow everywhere
+  glm::dvec2 origin_w_m{0};   ///< D's origin in W; if the DEM is cut, plants stay in place in W
 };
 
 /// Returns the smallest rotation that takes the z axis to a unit normal that points up.
@@ -58,9 +79,12 @@ struct Placement {
   friend bool operator==(const Placement&, const Placement&) = default;
 };
 
+/// Returns the extent of a grid's samples in D.
+Area area_of(const GridFrame& frame);
+
 /// Layer of plants over the whole ground. Whether a plant stands at a position is a function of
-/// seed, layer, minimum distance and highest density, and of density, clearings and ground at that
-/// position alone. Immutable; any number of threads may query it.
+/// seed, layer, minimum distance or rows, highest density, and of density, suitability, clearings
+/// and ground at that position alone. Immutable; any number of threads may query it.
 class Scatter {
  public:
   /// Largest number of placements that are returned at once.
@@ -73,8 +97,8 @@ class Scatter {
 
   /// Returns the plants whose positions are in `area`, in order of their keys; a larger area
   /// contains the same plants there. The expected number in any region is the integral of the
-  /// density over the part of it that the limits permit and no clearing excludes, with a relative
-  /// error of at most 2e-4.
+  /// density times the suitability over the part of it that the limits permit and no clearing
+  /// excludes, with a relative error of at most 2e-4.
   /// @throws Error for more than max_placements plants or 1e9 darts, or if samples of the ground
   ///         cannot be read.
   std::vector<Placement> placements(const Area& area = {}, const PassRunner& runner = {}) const;

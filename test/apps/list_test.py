@@ -43,7 +43,7 @@ def test_lists_all_presets_materials_and_assets():
     found = [name[1] for name in names if name]
     kinds = [kind for kind, *_ in kinds_of_assets()]
     files = [path.stem for path in PRESETS + MATERIALS]
-    assert len(kinds) == 12
+    assert len(kinds) == 32
     assert sorted(found) == sorted(files + kinds)
 
 
@@ -96,7 +96,7 @@ def test_reflectances_of_matt_materials_are_those_of_their_spectra(path):
     material = yaml.safe_load(path.read_text())
     found = listed("materials")[path.stem]["reflectance_by_nm"]
     if "spectrum" not in material or "coat" in material:
-        assert path.stem in ("aluminium", "iron", "retro_reflector", "wet_soil")
+        assert path.stem in ("aluminium", "iron", "puddle", "retro_reflector", "wet_soil")
         return
     spectrum = material["spectrum"]
     wavelengths = spectrum["wavelengths_nm"]

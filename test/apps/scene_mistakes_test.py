@@ -523,8 +523,8 @@ VALUES = [
     in_scene(
         "an unknown asset",
         ROCK,
-        "asset: person",
-        "scene.yaml:14:35: key 'asset': there is no asset 'person'",
+        "asset: person_cilinder",
+        "scene.yaml:14:35: key 'asset': there is no asset 'person_cilinder'",
         "did you mean 'person_cylinder'?",
     ),
     in_scene(

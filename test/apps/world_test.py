@@ -16,7 +16,7 @@ SHIPPED = ROOT / "data/scenes/offroad_trail.yaml"
 SCENE = SHIPPED.read_text().partition("\ncameras:\n")[0] + "\n"  # what lidars see of it
 
 
-def run(command, scene, folder):
+def run(command, scene, folder, *options):
     text = scene.replace(": ../", f": {ROOT / 'data'}/")
     text = text.replace("file: rosette", f"file: {ROOT / 'data/scenes/rosette'}")
     text = re.sub(r"^duration_s: .*", "duration_s: 0.1", text, flags=re.M)
@@ -24,6 +24,7 @@ def run(command, scene, folder):
     arguments = [PROGRAM, command, folder / "scene.yaml"]
     if command == "generate":
         arguments += ["-o", folder / "out"]
+    arguments = [str(each) for each in (*arguments, *options)]
     return subprocess.run(arguments, capture_output=True, text=True, timeout=300)
 
 
@@ -209,6 +210,23 @@ def object_of(name, keys, label=5):
     return f"  - {{name: {name}, label: {label}, {keys}}}\n"
 
 
+def test_the_forest_track_has_all_its_layers(tmp_path):
+    """Also: the same bytes for any number of threads."""
+    scene = (ROOT / "data/scenes/forest_track.yaml").read_text().partition("\ncameras:\n")[0]
+    scans = []
+    for threads in (1, 2):
+        folder = tmp_path / str(threads)
+        folder.mkdir()
+        made = run("generate", scene + "\n", folder, "--threads", threads)
+        assert made.returncode == 0, made.stderr
+        scans.append((folder / "out/lidar/top/000000.ply").read_bytes())
+    assert scans[0] == scans[1]
+    scan = PlyData.read(folder / "out/lidar/top/000000.ply")["vertex"].data
+    labels, counts = np.unique(scan["label"], return_counts=True)
+    assert labels.tolist() == [1, 2, 3, 4, 5, 6]  # the ground, and each layer
+    assert counts.min() > 10
+
+
 def test_the_quarry_has_its_relief(tmp_path):
     scene = (ROOT / "data/scenes/quarry.yaml").read_text()
     for long, short in {"tolerance_mrad: 0.5": "tolerance_mrad: 2", "rays: 64": "rays: 16"}.items():
@@ -320,6 +338,52 @@ def test_a_driven_object_moves_until_the_last_pulse(tmp_path):
     assert scan["time"][mine].max() > 0.1
     speed = np.linalg.norm([scan[c][mine].astype(float) for c in ("vx", "vy", "vz")], axis=0)
     assert speed.min() > 1
+
+
+WALK = """drive: {waypoints_m: [[429454, %d], [429474, %d]], speed_m_s: %s, height_m: 0}"""
+
+
+def test_walkers_are_one_instance_whose_limbs_move(tmp_path):
+    """Parts share label and instance; the body moves while a foot stands."""
+    scene = BARE + "objects:\n"
+    scene += object_of("rock", "asset: rock, at_m: [429449, 5150686]", 4)
+    for name, label, place in (("person", 5, 5150686), ("deer", 6, 5150681)):
+        scene += object_of(name, f"asset: {name}, " + WALK % (place, place, 1.1), label)
+    result = run("generate", scene, tmp_path)
+    assert result.returncode == 0, result.stderr
+    record = yaml.safe_load((tmp_path / "out/dataset.yaml").read_text())
+    listed = {g["name"]: (g["first_instance"], g["count"]) for g in record["objects"]}
+    assert listed == {"rock": (1, 1), "person": (2, 1), "deer": (3, 1)}
+    scan = PlyData.read(tmp_path / "out/lidar/top/000000.ply")["vertex"].data
+    assert set(np.unique(scan["instance"])) <= {0, 1, 2, 3}
+    for instance, label in ((2, 5), (3, 6)):
+        mine = scan["instance"] == instance
+        assert mine.sum() > 100
+        assert (scan["label"][mine] == label).all()
+        speed = np.linalg.norm([scan[c][mine].astype(float) for c in ("vx", "vy", "vz")], axis=0)
+        assert 0.9 < np.median(speed) < 1.3
+        assert speed.min() < 0.6
+
+
+@pytest.mark.parametrize(
+    ("keys", "words"),
+    [
+        ("asset: person, scale: 2, " + WALK % (5150686, 5150686, 1), "scale = 2 does not apply"),
+        ("asset: deer, " + WALK % (5150686, 5150686, 1.9), "a deer of this size walks at up to"),
+        ("asset: deer, size_m: 0, " + WALK % (5150686, 5150686, 1), "size_m"),
+        ("asset: person, " + WALK % (5150686, 5150686, -1), "must be > 0"),
+        ("asset: person, detail: 2, " + WALK % (5150686, 5150686, 1), "always has the same"),
+        ("asset: person, material: fur, " + WALK % (5150686, 5150686, 1), "'fur'"),
+        ("asset: deer, materials: {hair: bark}, " + WALK % (5150686, 5150686, 1), "fur, hoof"),
+        (
+            "asset: person, drive: {waypoints_m: [[429451, 5150686], [429451.05, 5150686]],"
+            " speed_m_s: 1, height_m: 0}",
+            "reduce the duration or the speed",
+        ),
+    ],
+)
+def test_walkers_that_cannot_walk_are_refused(tmp_path, keys, words):
+    assert refused(BARE + "objects:\n" + object_of("walker", keys), tmp_path, words)
 
 
 def test_the_times_of_a_recorded_object_must_overlap_the_run(tmp_path):

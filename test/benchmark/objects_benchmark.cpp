@@ -6,12 +6,14 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <glm/geometric.hpp>
 
 #include "apps/scene/readers/scene_reader.h"
 #include "core/tracing/scene.h"
 #include "sensors/lidar/beam/pulse_tracer.h"
 #include "sensors/lidar/lidar.h"
 #include "terrain/assets/asset.h"
+#include "terrain/assets/asset_sway.h"
 #include "terrain/scatter/scatter.h"
 #include "terrain/terrain_scene.h"
 #include "test/benchmark/timing.h"
@@ -112,6 +114,46 @@ void objects_among(::benchmark::State& state, AssetKind kind, double per_m2) {
 BENCHMARK_CAPTURE(objects_among, grass, AssetKind::GrassTuft, 0.95)->MinTime(2);
 BENCHMARK_CAPTURE(objects_among, shrubs, AssetKind::Shrub, 0.05)->MinTime(2);
 BENCHMARK_CAPTURE(objects_among, conifers, AssetKind::Conifer, 0.01)->MinTime(2);
+
+// Plants that sway, compared with the same plants at rest; `wind` is the ratio of the CPU times.
+void objects_in_wind(::benchmark::State& state, AssetKind kind, double per_m2) {
+  const auto objects = plants(per_m2);
+  const AssetSpec asset{.kind = kind};
+  const Scene ground = planted_scene(make_asset(asset), objects);
+  const auto rays = sweep_rays(ground);
+  const RayDevice device;
+  const std::vector<ModelScene> models{{device, make_asset(asset), Tracing::Fast}};
+  const ObjectTracer still(device, models, objects, {});
+  const ObjectTracer swaying(device, models, objects, {},
+                             {Sway({.speed_m_s = 8}, asset_flexibility(asset))});
+  std::vector<Hit> bare(rays.size()), hits;
+  ground.rays.trace(rays, bare);
+  double still_s = 0, swaying_s = 0;
+  for (auto _ : state) {
+    for (const ObjectTracer* const tracer : {&still, &swaying}) {
+      hits = bare;
+      const double begin_s = processor_s();
+      tracer->trace(rays, hits);
+      (tracer == &still ? still_s : swaying_s) += processor_s() - begin_s;
+    }
+  }
+  double radius_m = 0;
+  for (const glm::dvec3& p_O : models[0].model().mesh.vertices_m)
+    radius_m = std::max(radius_m, glm::length(p_O));
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    if (hits[i].object == 0) continue;
+    const PlacedObject at = swaying.placed_at(hits[i].object, rays[i].time);
+    const glm::dvec3 arm = rays[i].origin + rays[i].direction * hits[i].range_m - at.p_DO;
+    const Lean lean = swaying.lean(hits[i].object, rays[i].time);
+    if (glm::length(lean.upright(arm)) > at.scale * radius_m * (1 + 1e-9))
+      return state.SkipWithError("a ray hit a plant beside where it leans");
+  }
+  state.counters["wind"] = swaying_s / still_s;
+}
+BENCHMARK_CAPTURE(objects_in_wind, grass, AssetKind::GrassTuft, 0.95)->MinTime(2);
+BENCHMARK_CAPTURE(objects_in_wind, meadow, AssetKind::GrassPatch, 0.5)->MinTime(2);
+BENCHMARK_CAPTURE(objects_in_wind, shrubs, AssetKind::Shrub, 0.05)->MinTime(2);
+BENCHMARK_CAPTURE(objects_in_wind, conifers, AssetKind::Conifer, 0.01)->MinTime(2);
 
 void objects_alpha(::benchmark::State& state) {
   const auto objects = plants(0.01);

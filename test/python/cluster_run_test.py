@@ -226,6 +226,10 @@ def test_a_worker_with_another_version_or_other_inputs_is_rejected(store, tmp_pa
     camera.write_text(camera.read_text().replace("exposure_ms: 1", "exposure_ms: 2"))
     with pytest.raises(Exception, match="another run than the first shard: 'inputs: "):
         make_shard(task(store, scene=str(moved / "scene.yaml")), 2)
+    other = program(tmp_path, f"export LD_PRELOAD={PROGRAM.parent}/libother_sleef.so")
+    with pytest.raises(Exception, match="another run than the first shard: 'functions: "):
+        make_shard(task(store, program=str(other)), 2)
+    assert not (store / "shards/2.done").exists()
 
 
 def test_verify_names_what_is_missing_changed_or_superfluous(store, capsys):

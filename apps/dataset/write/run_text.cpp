@@ -18,6 +18,7 @@
 #include "apps/scene/readers/scene_reader.h"
 #include "core/error.h"
 #include "core/io/file_io.h"
+#include "core/math_fingerprint.h"
 
 namespace groundray {
 namespace {
@@ -138,14 +139,14 @@ std::vector<RunInput> run_inputs(const Simulation& simulation) {
 std::string run_header(const Simulation& simulation, const FrameChoice& choice) {
   const glm::dvec3 origin_m = simulation.terrain.header().origin_w_m;
   std::string text = fmt::format(
-      "groundray_dataset: 1\nversion: {}\nseed: {}\ntracing: {}\ninputs: "
-      "\"{:016x}\"\ntime_origin_s: {}\n"
+      "groundray_dataset: 1\nversion: {}\nseed: {}\ntracing: {}\nfunctions: \"{:016x}\"\n"
+      "inputs: \"{:016x}\"\ntime_origin_s: {}\n"
       "origin_w_m: [{}, {}, {}]\ncrs: "
       "{}\ncrs_wkt: {}\nscene: "
       "{}\nsensors:\n",
       yaml_text(GROUNDRAY_VERSION), simulation.spec.seed.value,
-      simulation.spec.tracing == Tracing::Fast ? "fast" : "exact", fingerprint(simulation),
-      seconds_text(simulation.begin), origin_m.x, origin_m.y, origin_m.z,
+      simulation.spec.tracing == Tracing::Fast ? "fast" : "exact", math::fingerprint(),
+      fingerprint(simulation), seconds_text(simulation.begin), origin_m.x, origin_m.y, origin_m.z,
       yaml_text(simulation.terrain.header().crs_name),
       yaml_text(simulation.terrain.header().crs_wkt), yaml_text(simulation.spec.text));
   std::size_t number = 0;

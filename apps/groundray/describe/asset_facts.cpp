@@ -18,7 +18,10 @@ std::string line_of(AssetKind kind) {
   };
   add("width_m", defaults.width_m);
   add("sag_m", defaults.sag_m);
+  add("per_m2", defaults.per_m2);
   add("leaf_area_index", defaults.leaf_area_index);
+  if (defaults.leaf_area_index) text += ", leaves: cards";
+  if (defaults.has_health) text += ", health: 1";
   if (defaults.has_squares) text += ", square_m: none (plain)";
   if (defaults.has_variants) text += ", variant: 0";
   if (defaults.has_detail) text += ", detail: 1";

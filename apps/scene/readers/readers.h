@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <glm/vec2.hpp>
 #include <optional>
+#include <set>
 #include <span>
 #include <string>
 #include <string_view>
@@ -37,8 +38,43 @@ const Node* read_path(Map& map, std::string_view key, Need need, const fs::path&
 std::vector<glm::dvec2> read_points(std::span<const Node> pairs, std::string_view key,
                                     Faults& faults);
 
+/// Records names that an earlier entry of a list already has.
+class UniqueNames {
+ public:
+  UniqueNames(std::string_view what, Faults& faults) : what_(what), faults_(faults) {}
+  void add(const Node& entry, const std::string& name) {
+    if (!name.empty() && !names_.insert(name).second)
+      faults_.add(entry, "name", "'{}' is taken by an earlier {}: names must differ", name, what_);
+  }
+
+ private:
+  std::string_view what_;
+  Faults& faults_;
+  std::set<std::string> names_;
+};
+
+/// Reads the key `waypoints_m`, at least two points.
+/// @param what  has them, for messages.
+std::vector<glm::dvec2> read_waypoints(Map& map, std::string_view what, Faults& faults);
+
+/// Reads the list `trails` of a terrain.
+std::vector<TrailSpec> read_trails(Map& terrain, Faults& faults);
+
+/// Returns the trail that a key names; null if the key is missing or no trail has the name, which
+/// is a fault.
+const TrailSpec* find_trail(Map& map, std::string_view key, std::span<const TrailSpec> trails,
+                            Faults& faults);
+
 /// Reads the key `sources` of a file: a map of texts, which are not kept.
 void check_sources(Map& root, Faults& faults);
+
+/// Reads what an image of the ground is generated of: `generate`, `variant`, `pixels` and `size_m`.
+/// Returns nullopt, with faults recorded, if it is invalid.
+std::optional<GroundImageSpec> read_ground_image(Map& map, Faults& faults);
+
+/// Reads `texture` of the ground or of a layer of its cover, if it is present.
+std::optional<GroundTextureSpec> read_ground_texture(Map& map, const fs::path& path,
+                                                     Faults& faults);
 
 /// Reads the map `terrain` of a scene, with the image of its relief.
 TerrainSpec read_terrain(Map terrain, const fs::path& path, const DataFolders& folders,
@@ -51,8 +87,18 @@ inline constexpr Rule slope_rule{[](double value) { return value >= 0 && value <
 /// interval as a fault.
 void read_interval(Map& entry, std::string_view key, Interval& interval, Rule rule, Faults& faults);
 
+/// Reads limits [low, high] at `key`, and the width of their ramps at `blend_key`.
+CoverLimits read_limits(Map& entry, std::string_view key, std::string_view blend_key, Rule rule,
+                        Faults& faults);
+
+/// Reads the conditions `trail`, `water` and `canopy` of a layer.
+SiteConditions read_site(Map& entry, std::span<const TrailSpec> trails, Faults& faults);
+
 /// Reads the map `weather` of a scene.
 AtmosphereSpec read_air(Map map, Faults& faults);
+
+/// Reads the map `wind` of a scene.
+Wind read_wind(Map map);
 
 /// Reads the map `sky` of a scene (docs/theory/sky.md). The image that it names is read for
 /// validation only, and not kept.
@@ -63,17 +109,27 @@ SkySpec read_sky(Map map, const fs::path& path, Faults& faults);
 std::optional<Material> read_material(const Node& node, std::string_view key, const fs::path& path,
                                       const DataFolders& folders, Faults& faults);
 
+/// Reads the keys of an entry that give its model and materials.
+ModelSpec read_model_spec(Map& entry, const fs::path& path, const DataFolders& folders,
+                          Faults& faults);
+
+/// Reads the key `stance`.
+void read_stance(Map& entry, Stance& stance);
+
 /// Reads the map `platform` of a scene.
+/// @param trails  of the scene, which may be named.
 std::variant<RecordedPath, DrivenPath> read_platform(Map platform, const fs::path& path,
+                                                     std::span<const TrailSpec> trails,
                                                      Faults& faults);
 
 /// Reads the list `objects` of a scene.
 std::vector<ObjectSpec> read_objects(Map& root, const fs::path& path, const DataFolders& folders,
-                                     Faults& faults);
+                                     std::span<const TrailSpec> trails, Faults& faults);
 
-/// Reads the list `scatter` of a scene.
+/// Reads the lists `scatter` and `ecosystem` of a scene.
+/// @param terrain  of the scene, whose trails may be named.
 std::vector<ScatterLayer> read_scatter(Map& root, const fs::path& path, const DataFolders& folders,
-                                       Faults& faults);
+                                       const TerrainSpec& terrain, Faults& faults);
 
 /// Reads the lists `lidars`, `cameras` and `stereo` of a scene, and the files that they name, into
 /// `scene`. Contradictions between the keys of a lidar are not checked here.

@@ -137,7 +137,7 @@ void check_cameras(const SceneSpec& scene, const Node& node, Faults& faults) {
 // Sets the sunlight of lidars that do not specify it to that of the sky's sun.
 void light_by_sky(SceneSpec& scene, std::span<const Node> entries, Faults& faults) {
   if (!scene.sky || !scene.sky->sun) return;
-  const Sun sun(*scene.sky->sun, scene.sky->air);
+  const Sun sun = sun_of(*scene.sky).value();
   for (std::size_t i = 0; i < scene.lidars.size(); ++i) {
     auto& light = scene.lidars[i].lidar.light;
     if (!light || light->sun.irradiance_w_m2_nm) continue;
@@ -209,14 +209,18 @@ SceneSpec parse_scene(const std::string& text, const fs::path& path,
   if (auto terrain = root.map("terrain", Need::Required)) {
     scene.terrain = read_terrain(std::move(*terrain), path, folders, faults);
   }
+  const std::span<const TrailSpec> trails =
+      scene.terrain.relief ? std::span<const TrailSpec>(scene.terrain.relief->trails)
+                           : std::span<const TrailSpec>();
   if (auto platform = root.map("platform", Need::Required)) {
-    scene.platform = read_platform(std::move(*platform), path, faults);
+    scene.platform = read_platform(std::move(*platform), path, trails, faults);
   }
   if (auto weather = root.map("weather", Need::Optional))
     scene.air = read_air(std::move(*weather), faults);
+  if (auto wind = root.map("wind", Need::Optional)) scene.wind = read_wind(std::move(*wind));
   read_sensors(root, path, preset_folder, scene, faults);
-  scene.objects = read_objects(root, path, folders, faults);
-  scene.scatter = read_scatter(root, path, folders, faults);
+  scene.objects = read_objects(root, path, folders, trails, faults);
+  scene.scatter = read_scatter(root, path, folders, scene.terrain, faults);
   if (auto sky = root.map("sky", Need::Optional))
     scene.sky = read_sky(std::move(*sky), path, faults);
   const auto entries = root.list("lidars", Need::Optional);

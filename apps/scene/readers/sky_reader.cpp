@@ -8,6 +8,7 @@
 #include "apps/scene/readers/readers.h"
 #include "core/error.h"
 #include "core/image/image_io.h"
+#include "core/math.h"
 
 namespace groundray::yaml {
 namespace {
@@ -62,9 +63,21 @@ EnvironmentImage read_environment(Map map, const fs::path& path, Faults& faults)
   return sky;
 }
 
+CloudSpec read_clouds(Map map) {
+  CloudSpec clouds;
+  map.read_number("cover", Need::Required, clouds.cover, share_rule);
+  map.read_number("optical_depth", Need::Optional, clouds.optical_depth, not_negative);
+  map.read_number("height_m", Need::Optional, clouds.height_m, positive);
+  map.read_number("size_m", Need::Optional, clouds.size_m, positive);
+  map.read_whole("variant", Need::Optional, clouds.variant.value);
+  map.close();
+  return clouds;
+}
+
 AnalyticSky read_analytic(Map map, Faults& faults) {
   AnalyticSky sky;
   read_rgb(map, "ground_albedo", Need::Optional, share_rule, faults, sky.ground_albedo);
+  if (auto clouds = map.map("clouds", Need::Optional)) sky.clouds = read_clouds(std::move(*clouds));
   map.close();
   return sky;
 }
@@ -190,6 +203,23 @@ AtmosphereSpec read_air(Map map, Faults& faults) {
     faults.add(map.node(), "weather", "has haze and fog: give one of visibility_m and fog_range_m");
   map.close();
   return air;
+}
+
+Wind read_wind(Map map) {
+  constexpr Rule speed_rule{
+      [](double value) { return value == 0 || (value >= 0.1 && value <= 30); },
+      "must be 0, or from 0.1 to 30"};
+  constexpr Rule turbulence_rule{[](double value) { return value >= 0 && value <= 0.5; },
+                                 "must be from 0 to 0.5"};
+  Wind wind;
+  double from_deg = 270;
+  map.read_number("speed_m_s", Need::Required, wind.speed_m_s, speed_rule);
+  map.read_number("from_deg", Need::Optional, from_deg);
+  map.read_number("turbulence", Need::Optional, wind.turbulence, turbulence_rule);
+  map.close();
+  const double from_rad = glm::radians(from_deg);
+  wind.towards = {-math::sin(from_rad), -math::cos(from_rad)};
+  return wind;
 }
 
 }  // namespace groundray::yaml

@@ -1,3 +1,5 @@
+#include <algorithm>
+#include <cstdint>
 #include <glm/trigonometric.hpp>
 #include <limits>
 #include <utility>
@@ -5,23 +7,44 @@
 #include "apps/scene/readers/readers.h"
 #include "core/error.h"
 #include "core/image/image_io.h"
+#include "terrain/textures/ground_images.h"
 
 namespace groundray::yaml {
 namespace {
 
-ImageRelief read_image_relief(Map map, const fs::path& path, Faults& faults) {
+// Returns relief of the heights of generated ground, with values from 0 to 1.
+ImageRelief relief_of(const GroundImageSpec& spec) {
+  ImageRelief relief{make_ground_images(spec).height_m, 0, 0, spec.size_m};
+  const auto values = relief.image.values();
+  const auto [low, high] = std::ranges::minmax(values);
+  relief.amplitude_m = static_cast<double>(high - low);
+  relief.middle = static_cast<double>(-low / (high - low));
+  for (float& value : values) value = (value - low) / (high - low);
+  return relief;
+}
+
+ImageRelief read_image_relief(Map map, const fs::path& path,
+                              std::optional<GroundImageSpec>& generated, Faults& faults) {
   ImageRelief relief;
-  std::string file;
-  if (const Node* const at = map.read_text("file", Need::Required, file)) {
-    try {
-      relief.image = read_heights(beside(path, file));
-    } catch (const Error& fault) {
-      faults.add(*at, "file", "the image cannot be read:\n{}", fault.what());
+  if (map.find("generate", Need::Optional) != nullptr) {
+    if (const auto spec = read_ground_image(map, faults)) {
+      generated = spec;
+      relief = relief_of(*spec);
     }
+    map.read_number("amplitude_m", Need::Optional, relief.amplitude_m);
+  } else {
+    std::string file;
+    if (const Node* const at = map.read_text("file", Need::Required, file)) {
+      try {
+        relief.image = read_heights(beside(path, file));
+      } catch (const Error& fault) {
+        faults.add(*at, "file", "the image cannot be read:\n{}", fault.what());
+      }
+    }
+    map.read_number("amplitude_m", Need::Required, relief.amplitude_m);
+    map.read_number("size_m", Need::Required, relief.size_m, positive);
   }
-  map.read_number("amplitude_m", Need::Required, relief.amplitude_m);
   map.read_number("middle", Need::Optional, relief.middle);
-  map.read_number("size_m", Need::Required, relief.size_m, positive);
   map.close();
   return relief;
 }
@@ -37,48 +60,56 @@ FractalSpec read_fractal(Map map) {
   return fractal;
 }
 
-ReliefSpec read_relief(Map map, const fs::path& path, Faults& faults) {
+ReliefSpec read_relief(Map map, const fs::path& path, std::optional<GroundImageSpec>& generated,
+                       Faults& faults) {
   ReliefSpec relief;
   map.read_number("cell_m", Need::Required, relief.cell_m, positive);
   map.read_number("period_m", Need::Optional, relief.period_m, positive);
   if (auto image = map.map("image", Need::Optional))
-    relief.image = read_image_relief(std::move(*image), path, faults);
+    relief.image = read_image_relief(std::move(*image), path, generated, faults);
   if (auto fractal = map.map("fractal", Need::Optional))
     relief.fractal = read_fractal(std::move(*fractal));
-  if (!relief.image && !relief.fractal && map.node().kind == Node::Kind::Map)
-    faults.add(map.node(), "relief", "must have 'image' or 'fractal', or both");
   map.close();
   return relief;
 }
 
-// Reads images that repeat over the ground.
-std::optional<GroundTextureSpec> read_ground_texture(Map& map, const fs::path& path,
-                                                     Faults& faults) {
-  auto texture = map.map("texture", Need::Optional);
-  if (!texture) return std::nullopt;
-  GroundTextureSpec spec;
-  read_path(*texture, "albedo", Need::Optional, path, spec.albedo);
-  read_path(*texture, "normal", Need::Optional, path, spec.normal);
-  if (spec.albedo.empty() && spec.normal.empty() && texture->node().kind == Node::Kind::Map)
-    faults.add(texture->node(), "texture", "must have 'albedo' or 'normal', or both");
-  texture->read_number("size_m", Need::Required, spec.size_m, positive);
-  texture->close();
-  return spec;
+constexpr Rule talus_rule{[](double value) { return value >= 5 && value <= 80; },
+                          "must be from 5 to 80"};
+constexpr Rule area_exponent_rule{[](double value) { return value >= 0 && value <= 2; },
+                                  "must be from 0 to 2"};
+constexpr Rule slope_exponent_rule{[](double value) { return value >= 0.25 && value <= 4; },
+                                   "must be from 0.25 to 4"};
+
+constexpr Rule uplift_rule{[](double value) { return value >= 0 && value <= 0.1; },
+                           "must be from 0 to 0.1 (metres)"};
+
+StreamPower read_streams(Map map, Faults& faults) {
+  StreamPower law;
+  map.read_number("years", Need::Required, law.years, positive);
+  map.read_number("erodibility", Need::Required, law.erodibility, not_negative);
+  map.read_number("area_exponent", Need::Optional, law.area_exponent, area_exponent_rule);
+  map.read_number("slope_exponent", Need::Optional, law.slope_exponent, slope_exponent_rule);
+  map.read_number("uplift_m_yr", Need::Optional, law.uplift_m_yr, uplift_rule);
+  std::uint16_t steps = static_cast<std::uint16_t>(law.steps);
+  if (const Node* const at = map.read_whole("steps", Need::Optional, steps); at && steps == 0)
+    faults.add(*at, "steps", "is 0, but must be at least 1");
+  law.steps = std::max<int>(steps, 1);
+  map.close();
+  return law;
 }
 
-// Reads limits [low, high] at `key`, and the width of their ramps at `blend_key`.
-CoverLimits read_limits(Map& entry, std::string_view key, std::string_view blend_key, Rule rule,
-                        Faults& faults) {
-  CoverLimits limits;
-  Interval ends{limits.low, limits.high};
-  read_interval(entry, key, ends, rule, faults);
-  limits.low = ends.low;
-  limits.high = ends.high;
-  const Node* const blend =
-      entry.read_number(blend_key, Need::Optional, limits.blend, not_negative);
-  if (blend != nullptr && entry.find(key, Need::Optional) == nullptr)
-    faults.add(*blend, blend_key, "applies to '{}', which is missing", key);
-  return limits;
+ErosionSpec read_erosion(Map map, Faults& faults) {
+  ErosionSpec erosion;
+  double talus_deg = 0;
+  if (map.read_number("talus_deg", Need::Optional, talus_deg, talus_rule) != nullptr)
+    erosion.talus_rad = glm::radians(talus_deg);
+  if (auto streams = map.map("streams", Need::Optional))
+    erosion.streams = read_streams(std::move(*streams), faults);
+  if (map.node().kind == Node::Kind::Map && map.find("talus_deg", Need::Optional) == nullptr &&
+      map.find("streams", Need::Optional) == nullptr)
+    faults.add(map.node(), "erosion", "must have 'talus_deg' or 'streams', or both");
+  map.close();
+  return erosion;
 }
 
 void read_mask(Map& entry, const fs::path& path, CoverSpec& spec, Faults& faults) {
@@ -91,7 +122,7 @@ void read_mask(Map& entry, const fs::path& path, CoverSpec& spec, Faults& faults
 }
 
 CoverSpec read_cover_layer(const Node& node, const fs::path& path, const DataFolders& folders,
-                           Faults& faults) {
+                           std::span<const TrailSpec> trails, Faults& faults) {
   Map entry(node, "cover", faults);
   CoverSpec spec;
   if (const Node* const material = entry.find("material", Need::Required))
@@ -107,16 +138,17 @@ CoverSpec read_cover_layer(const Node& node, const fs::path& path, const DataFol
   if (spec.slope_rad.high == glm::radians(90.0)) spec.slope_rad.high = infinity;
   spec.height_m = read_limits(entry, "height_m", "height_blend_m", any_number, faults);
   read_mask(entry, path, spec, faults);
+  spec.site = read_site(entry, trails, faults);
   spec.texture = read_ground_texture(entry, path, faults);
   entry.close();
   return spec;
 }
 
 std::vector<CoverSpec> read_cover(Map& terrain, const fs::path& path, const DataFolders& folders,
-                                  Faults& faults) {
+                                  std::span<const TrailSpec> trails, Faults& faults) {
   std::vector<CoverSpec> layers;
   for (const Node& entry : terrain.list("cover", Need::Optional))
-    layers.push_back(read_cover_layer(entry, path, folders, faults));
+    layers.push_back(read_cover_layer(entry, path, folders, trails, faults));
   constexpr std::size_t most = GroundCover::most_layers - 1;  // one is the terrain's own
   if (layers.size() > most) {
     faults.add(*terrain.find("cover", Need::Optional), "cover",
@@ -141,10 +173,43 @@ TerrainSpec read_terrain(Map terrain, const fs::path& path, const DataFolders& f
   TerrainSpec spec;
   if (const Node* const node = terrain.find("material", Need::Optional))
     spec.material = read_material(*node, "material", path, folders, faults);
+  if (auto erosion = terrain.map("erosion", Need::Optional))
+    spec.erosion = read_erosion(std::move(*erosion), faults);
   if (auto relief = terrain.map("relief", Need::Optional))
-    spec.relief = read_relief(std::move(*relief), path, faults);
+    spec.relief = read_relief(std::move(*relief), path, spec.relief_ground, faults);
+  std::vector<TrailSpec> trails = read_trails(terrain, faults);
+  if (const Node* const at = terrain.find("relief", Need::Optional);
+      at != nullptr && spec.relief && trails.empty() && !spec.relief->image &&
+      !spec.relief->fractal && at->kind == Node::Kind::Map)
+    faults.add(*at, "relief", "must have 'image' or 'fractal', or both, unless there are trails");
+  if (const Node* const at = terrain.find("trails", Need::Optional);
+      at != nullptr && !trails.empty() && !spec.relief) {
+    faults.add(*at, "trails", "need 'relief' with the size of its cells, such as {{cell_m: 0.1}}");
+    spec.relief.emplace();  // so that names of trails are found
+  }
+  if (spec.relief) spec.relief->trails = std::move(trails);
   spec.texture = read_ground_texture(terrain, path, faults);
-  spec.cover = read_cover(terrain, path, folders, faults);
+  spec.cover = read_cover(
+      terrain, path, folders,
+      spec.relief ? std::span<const TrailSpec>(spec.relief->trails) : std::span<const TrailSpec>(),
+      faults);
+  if (auto water = terrain.map("water", Need::Optional)) {
+    WaterGrid& grid = spec.water.emplace();
+    water->read_number("cell_m", Need::Required, grid.cell_m, positive);
+    water->read_number("most_m", Need::Optional, grid.most_m, positive);
+    water->close();
+  }
+  const bool needs_water = std::ranges::any_of(
+      spec.cover, [](const CoverSpec& layer) { return layer.site.water.has_value(); });
+  if (needs_water && terrain.find("water", Need::Optional) == nullptr)
+    faults.add(terrain.node(), "terrain",
+               "a cover layer with 'water' needs 'water' with the size of its cells, such as "
+               "water: {{cell_m: 0.5}}");
+  if (auto canopy = terrain.map("canopy", Need::Optional)) {
+    canopy->read_number("cell_m", Need::Optional, spec.canopy.cell_m, positive);
+    canopy->read_number("radius_m", Need::Optional, spec.canopy.radius_m, positive);
+    canopy->close();
+  }
   read_path(terrain, "orthophoto", Need::Optional, path, spec.orthophoto);
   if (const Node* const dem = read_path(terrain, "dem", Need::Required, path, spec.dem))
     spec.where = faults.place(*dem);

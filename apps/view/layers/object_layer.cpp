@@ -16,8 +16,9 @@ namespace groundray {
 namespace {
 
 struct Shown {
-  std::uint32_t number = 0;  // number of the object
+  std::uint32_t number = 0;  // of the instance, of which this is all or a part
   PlacedObject place;
+  Lean lean;
 };
 
 // Returns the objects nearest to a point, at least one, within a number of triangles; ordered by
@@ -26,9 +27,13 @@ std::vector<Shown> nearest(const Simulation& simulation, const SceneObjects::Gro
                            std::chrono::nanoseconds time, const glm::dvec3& near_m,
                            std::size_t most_triangles) {
   std::vector<Shown> all;
-  for (std::uint32_t i = 0; i < group.count; ++i)
-    all.push_back(
-        {group.first + i, simulation.scene_objects.objects.placed_at(group.first + i, time)});
+  const ObjectTracer& objects = simulation.scene_objects.objects;
+  for (std::uint32_t i = 0; i < group.count; ++i) {
+    const ObjectRange parts = objects.parts_of(group.first + i);
+    for (std::uint32_t k = 0; k < parts.count; ++k)
+      all.push_back({group.first + i, objects.placed_at(parts.first + k, time),
+                     objects.lean(parts.first + k, time)});
+  }
   const auto distance = [&](const Shown& one) {
     return glm::length(glm::dvec2(one.place.p_DO - near_m));
   };
@@ -42,6 +47,13 @@ std::vector<Shown> nearest(const Simulation& simulation, const SceneObjects::Gro
   all.resize(kept);
   std::ranges::sort(all, {}, &Shown::number);
   return all;
+}
+
+std::size_t count_of(const std::vector<Shown>& shown) {  // ordered by number
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < shown.size(); ++i)
+    count += i == 0 || shown[i].number != shown[i - 1].number ? 1 : 0;
+  return count;
 }
 
 // Mesh of several objects, with values of each triangle and texture coordinates of each vertex.
@@ -68,8 +80,10 @@ void add_model(const Simulation& simulation, const Shown& shown,
   const Model& model = simulation.scene_objects.objects.models()[shown.place.model].model();
   TriangleMesh& mesh = shapes.mesh;
   const auto first = static_cast<std::uint32_t>(mesh.vertices_m.size());
-  for (const glm::dvec3& p : model.mesh.vertices_m)
-    mesh.vertices_m.push_back(shown.place.p_DO + shown.place.R_DO * (shown.place.scale * p));
+  for (const glm::dvec3& p : model.mesh.vertices_m) {
+    const glm::dvec3 upright = shown.place.R_DO * (shown.place.scale * p);
+    mesh.vertices_m.push_back(shown.place.p_DO + shown.lean.leaning(upright));
+  }
   shapes.mask_uv.resize(mesh.vertices_m.size(), cut_outs.opaque());
   for (std::uint32_t i = 0; i < model.mesh.triangles.size(); ++i) {
     glm::uvec3 corner = model.mesh.triangles[i] + first;
@@ -127,7 +141,7 @@ Layer object_layer(const Simulation& simulation, std::size_t group, std::chrono:
   add_colours(layer, {.name = "colour", .unit = "", .of = of_cells}, shapes.rgb);
   layer.coloured_by = "colour";
   layer.facts.insert(layer.facts.begin(),
-                     fmt::format("{} of {} objects", shown.size(), entry.count));
+                     fmt::format("{} of {} objects", count_of(shown), entry.count));
   return layer;
 }
 

@@ -74,7 +74,11 @@ FollowedSource open_source(const std::filesystem::path& path, const DemOptions& 
         std::make_shared<FileTiles>(std::move(file), std::move(certificate), tile_cache_bytes);
   }
   if (relief) {
-    source.relief = std::make_shared<const Relief>(*relief, source.frame, memory_bytes);
+    const Ground dem(source.tiles, source.frame);
+    source.relief = Relief(*relief, source.frame, memory_bytes)
+                        .with_trails(
+                            relief->trails, [&](glm::dvec2 p) { return dem.height_m_at(p); },
+                            glm::dvec2(source.origin_w_m));
     source.tiles = std::make_shared<RefinedTiles>(source.tiles, source.relief);
     source.frame = source.relief->frame();
   }

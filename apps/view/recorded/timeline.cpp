@@ -106,7 +106,8 @@ std::vector<MovingThing> moving_things(const Simulation& simulation) {
 }
 
 PlacedObject place_of(const Simulation& simulation, const MovingThing& thing, nanoseconds time) {
-  return simulation.scene_objects.objects.placed_at(thing.instance, time);
+  const ObjectTracer& objects = simulation.scene_objects.objects;
+  return objects.placed_at(objects.parts_of(thing.instance).first, time);
 }
 
 }  // namespace groundray

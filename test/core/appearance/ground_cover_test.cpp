@@ -3,9 +3,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <limits>
+#include <memory>
 #include <numbers>
 #include <numeric>
 #include <random>
@@ -194,6 +196,30 @@ TEST(GroundCover, RejectsInvalidLayers) {
               ThrowsMessage<Error>(HasSubstr("the blend of its slope = -1")));
   EXPECT_THAT(make({{.texture = GroundTexture{nullptr, nullptr, 0}}}),
               ThrowsMessage<Error>(HasSubstr("size_m = 0")));
+}
+
+// A line along x from 0 to 20 at y = 5; shares follow from y alone beside it.
+TEST(GroundCover, SharesFollowTheDistanceFromLines) {
+  TangentLine line{.points_m = {}, .tangents = {}, .spacing_m = 1};
+  for (int x = 0; x <= 20; ++x) {
+    line.points_m.emplace_back(x, 5);
+    line.tangents.emplace_back(1, 0);
+  }
+  const auto field = std::make_shared<const LineField>(line, 6);
+  CoverLayer on{.material = 1, .distance_m = {.high = 0, .blend = 1}, .lines = {{field, 0, 2}}};
+  CoverLayer ruts{.material = 2, .distance_m = {.high = 0.25}, .lines = {{field, 0.8, 0}}};
+  CoverLayer away{.material = 3, .distance_m = {.low = 3}, .lines = {{field, 0, 2}}};
+  const GroundCover cover({{}, on, ruts, away}, nullptr, {});
+  for (double y = -40; y < 40; y += 0.01) {
+    const double off_m = std::abs(y - 5);
+    const double is_rut = std::abs(off_m - 0.8) <= 0.25 ? 1 : 0, is_away = off_m >= 5 ? 1 : 0;
+    const double on_share = (1 - is_rut) * (1 - is_away) * std::clamp(2.5 - off_m, 0.0, 1.0);
+    if (std::abs(std::abs(off_m - 0.8) - 0.25) < 1e-6 || std::abs(off_m - 5) < 1e-6) continue;
+    const auto shares = cover.shares_at(GroundCover::on_facet({10, y, 0}, {0, 0, 1}));
+    ASSERT_NEAR(shares[1], on_share, 1e-6) << y;
+    ASSERT_EQ(shares[2], is_rut) << y;
+    ASSERT_EQ(shares[3], is_away) << y;
+  }
 }
 
 }  // namespace

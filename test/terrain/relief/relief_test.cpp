@@ -73,8 +73,12 @@ struct Refined {
   std::shared_ptr<const TileSource> tiles;
 };
 
+Trail::GroundHeight heights_of(const HeightGrid& dem) {
+  return [&dem](glm::dvec2 p) { return dem.height_m_at(p); };
+}
+
 Refined refine(const HeightGrid& dem, const ReliefSpec& spec) {
-  auto relief = std::make_shared<const Relief>(spec, dem.frame(), plenty);
+  auto relief = Relief(spec, dem.frame(), plenty).with_trails(spec.trails, heights_of(dem), {0, 0});
   const HeightGrid grid = relief->refined(dem);
   return {dem, relief, grid, std::make_shared<RefinedTiles>(certified_tiles(dem), relief)};
 }
@@ -87,6 +91,44 @@ std::vector<Refined> examples() {
           refine(with_holes(landscape({37, 18}, {5, -3}, 60), 4, 3, Seed{73}), rough(0.2, 9, 0.1)),
           refine(with_holes(dem, 20, 3, Seed{74}), rough(1, 200, 0.2)),
           refine(landscape({70, 41}, {2, 2}, 20), rough(2.5, 100, 0.2))};
+}
+
+// Adds a trail with everything that it can have, and another one that crosses it.
+ReliefSpec with_trails(ReliefSpec spec, double cell_m, const std::vector<glm::dvec2>& waypoints_m) {
+  TrailSpec trail{.name = "track",
+                  .waypoints_m = waypoints_m,
+                  .width_m = 12 * cell_m,
+                  .level_over_m = 8,
+                  .bank_slope = 1.5,
+                  .most_bank_m = 25,
+                  .most_grade = 5,
+                  .crown_m = 0.1,
+                  .relief_share = 0.4,
+                  .variation = 0.5};
+  trail.ruts = {.track_m = 5 * cell_m, .width_m = 2 * cell_m};
+  trail.washboard = {.wavelength_m = 4 * cell_m};
+  trail.potholes = {.per_100_m = 20, .diameter_m = {3 * cell_m, 6 * cell_m}};
+  trail.ditches = {.width_m = 4 * cell_m, .depth_m = 0.5};
+  trail.roots = {.per_100_m = 40, .width_m = 2 * cell_m, .height_m = 0.1};
+  TrailSpec creek = trail;
+  creek.name = "creek";
+  creek.raised_m = -1.5;
+  for (glm::dvec2& p_m : creek.waypoints_m)  // mirrored, so that it crosses the track
+    p_m.y = waypoints_m.front().y + waypoints_m.back().y - p_m.y;
+  spec.trails = {trail, creek};
+  return spec;
+}
+
+std::vector<Refined> examples_with_trails() {
+  std::vector<Refined> all = examples();
+  const std::vector<glm::dvec2> waypoints_m{{-30, 30}, {-10, 5}, {10, 15}, {38, -30}};
+  all.push_back(refine(landscape({75, 67}, {4, -4}, 60),
+                       with_trails(rough(0.6, 30, 0.05), 0.6, waypoints_m)));
+  all.push_back(refine(with_holes(landscape({75, 67}, {4, -4}, 60), 20, 3, Seed{74}),
+                       with_trails(rough(0.3, 30, 0.05), 0.3, {{-30, 30}, {-25, 20}, {-15, 18}})));
+  all.push_back(refine(landscape({70, 41}, {2, 2}, 20),
+                       with_trails({.cell_m = 2.5}, 2, {{-36, 42}, {20, 60}, {60, 110}})));
+  return all;
 }
 
 TEST(Relief, FineSamplesAreTheDemsSurfacePlusTheDisplacement) {
@@ -155,7 +197,7 @@ bool is_as_displacement(const Refined& of, int level, glm::ivec2 node) {
 
 // The oracle is the certificate of the whole displaced surface.
 TEST(RefinedTiles, MatchTheDisplacedSurfaceWithUpperBoundsOfDeviations) {
-  for (const Refined& of : examples()) {
+  for (const Refined& of : examples_with_trails()) {
     const auto exact = certified_tiles(of.grid);
     ASSERT_EQ(of.tiles->lattice(), exact->lattice());
     double most_rounding = 0;
@@ -232,9 +274,14 @@ Mesh mesh_of(const HeightGrid& grid, const Clipmap& clipmap) {
 }
 
 TEST(ReliefProof, LeavesOfAllLevelsFormOneSurfaceWithinTheirBound) {
-  const Refined of = refine(landscape({75, 67}, {6, -6}, 8), rough(0.8, 24, 0.03));
-  ASSERT_EQ(of.relief->exponent(), 3);
-  for (std::uint32_t i = 0; i < proof_size(3, 60); ++i) {
+  const HeightGrid dem = landscape({75, 67}, {6, -6}, 8);
+  const ReliefSpec plain = rough(0.8, 24, 0.03);
+  const Refined both[] = {
+      refine(dem, plain),
+      refine(dem, with_trails(plain, 0.75, {{0, 0}, {90, -70}, {200, -90}, {390, -330}}))};
+  for (std::uint32_t i = 0; i < proof_size(4, 60); ++i) {
+    const Refined& of = both[i / 2 % 2];
+    ASSERT_EQ(of.relief->exponent(), 3);
     const glm::dvec2 share = random_uniform({Seed{75}, 0, 0, i});
     const glm::dvec2 at = of.dem.frame().to_D({0, 0}) + share * glm::dvec2(440, -390);
     const glm::dvec3 p(at, of.dem.height_m_at(at).value_or(300) + 3);
@@ -270,7 +317,7 @@ std::vector<Hit> trace(const RayTracer& tracer, const std::vector<Ray>& rays) {
 }
 
 TEST(ReliefProof, RangesMatchTheReferenceOnTheDisplacedSurface) {
-  for (const Refined& of : examples()) {
+  for (const Refined& of : examples_with_trails()) {
     const glm::dvec2 middle = of.grid.frame().to_D({of.grid.columns() / 2, of.grid.rows() / 2});
     const glm::dvec3 sensor(middle, of.grid.max_height_m() + 2);
     const Clipmap clipmap(of.tiles, of.relief->frame(), {}, sensor_at(sensor));
@@ -297,7 +344,9 @@ TEST(ReliefProof, RangesMatchTheReferenceOnTheDisplacedSurface) {
 
 // With a tolerance, each reported bound holds, for rays that hit cells of all sizes.
 TEST(ReliefProof, ErrorBoundsHoldOnTheDisplacedSurface) {
-  const Refined of = refine(landscape({75, 67}, {4, -4}, 60), rough(0.25, 10, 0.02));
+  const Refined of =
+      refine(landscape({75, 67}, {4, -4}, 60),
+             with_trails(rough(0.25, 10, 0.02), 0.25, {{80, -60}, {120, -90}, {130, -150}}));
   const glm::dvec2 at = of.grid.frame().to_D({600, 500});
   const glm::dvec3 sensor(at, of.grid.height_m_at(at).value_or(0) + 3);
   // Windows of about 200 x 200 cells, smaller than the tolerance requires.
@@ -371,7 +420,7 @@ TEST(Relief, ErrorListsEveryFault) {
                         HasSubstr("shortest_m = 0.7 must be at least two cells, 1"),
                         HasSubstr("longest_m = 30 must not exceed period_m = 20"))));
   EXPECT_THAT([&] { Relief({}, dem, plenty); },
-              ThrowsMessage<Error>(HasSubstr("an image, a fractal or both")));
+              ThrowsMessage<Error>(HasSubstr("an image, a fractal or trails")));
   EXPECT_THAT([&] { Relief(rough(1e-8, 1e-6, 0.1), dem, plenty); },
               ThrowsMessage<Error>(HasSubstr("make cell_m larger")));
   EXPECT_THAT([&] { Relief(rough(0.01, 50, 0.01), dem, std::size_t{64} << 20); },

@@ -420,5 +420,47 @@ TEST(Scatter, ErrorReportsTooManyPlants) {
       ThrowsMessage<Error>(HasSubstr("indices overflow")));
 }
 
+// Neither condition moves a plant: those that remain are plants of the layer without conditions.
+TEST(Scatter, SuitabilityThinsTheLayer) {
+  ScatterSpec spec{.layer = 5};
+  const Scatter all(plane(400), DensityMap(0.5), spec, Seed{2});
+  spec.suitability = [](glm::dvec2 p) { return p.x < 0 ? 0.25 : p.y < 0 ? 0.0 : 1.0; };
+  const Scatter some(plane(400), DensityMap(0.5), spec, Seed{2});
+  const auto whole = all.placements(), thinned = some.placements();
+  const auto is_on = [](bool west, bool south) {
+    return [=](const Placement& plant) {
+      return (place(plant).x < 0) == west && (place(plant).y < 0) == south;
+    };
+  };
+  EXPECT_EQ(only(thinned, is_on(false, false)), only(whole, is_on(false, false)));
+  EXPECT_TRUE(only(thinned, is_on(false, true)).empty());
+  const double west = static_cast<double>(only(thinned, is_on(true, true)).size());
+  EXPECT_NEAR(west, 0.125 * 200 * 200, 4 * std::sqrt(0.125 * 200 * 200));
+  const std::set<std::uint64_t> keys = [&] {
+    std::set<std::uint64_t> found;
+    for (const Placement& plant : whole) found.insert(plant.key);
+    return found;
+  }();
+  for (const Placement& plant : thinned) EXPECT_TRUE(keys.contains(plant.key));
+}
+
+// Kolmogorov-Smirnov statistic of the scales against the cut exponential distribution; 1.95 is the
+// limit at a significance of 0.1 %.
+TEST(Scatter, ScalesFollowTheirDistribution) {
+  const ScatterSpec spec{.layer = 6, .scale = {1, 20}, .scales = Weibull{1, 7}};
+  const auto plants = Scatter(plane(200), DensityMap(0.5), spec, Seed{4}).placements();
+  std::vector<double> scales;
+  for (const Placement& plant : plants) scales.push_back(plant.scale);
+  std::ranges::sort(scales);
+  ASSERT_GT(scales.size(), 15'000u);
+  const auto count = static_cast<double>(scales.size());
+  double farthest = 0;
+  for (std::size_t i = 0; i < scales.size(); ++i) {
+    const double share = (1 - std::exp(-(scales[i] - 1) / 7)) / (1 - std::exp(-19.0 / 7));
+    farthest = std::max(farthest, std::abs(share - (static_cast<double>(i) + 0.5) / count));
+  }
+  EXPECT_LT(farthest * std::sqrt(count), 1.95);
+}
+
 }  // namespace
 }  // namespace groundray::scatter_test

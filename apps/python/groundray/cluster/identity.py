@@ -28,8 +28,8 @@ def log_of(shard: int) -> str:
 class Identity:
     """Inputs that determine the bytes of a run's objects, besides the files that the scene names.
 
-    Those are compared by their fingerprint in `common.yaml`. Processors and C libraries need no
-    comparison: elementary functions have the same bits on all (core/math.h).
+    Those are compared by their fingerprint in `common.yaml`, and so are the elementary functions,
+    which have the same bits on all processors and with all C libraries (core/math.h).
     """
 
     scene: str

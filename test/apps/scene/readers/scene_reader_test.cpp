@@ -170,8 +170,9 @@ TEST(SceneFile, SuggestsTheClosestKey) {
               HasSubstr(":4:1: key 'tracng': unknown; did you mean 'tracing'?"));
   EXPECT_THAT(complaint("yaw_deg: 90", "yaw: 90"),
               HasSubstr(":21:7: key 'yaw': unknown; did you mean 'yaw_deg'?"));
-  EXPECT_THAT(complaint("label: 40", "hue: 40"),
-              HasSubstr(":9:3: key 'hue': unknown; the keys here are cover, dem, label,"));
+  EXPECT_THAT(
+      complaint("label: 40", "hue: 40"),
+      HasSubstr(":9:3: key 'hue': unknown; the keys here are canopy, cover, dem, erosion, label,"));
 }
 
 TEST(SceneFile, ReportsAMisspeltKeyOnceAndNotAsMissing) {
