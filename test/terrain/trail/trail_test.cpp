@@ -13,6 +13,7 @@
 #include "terrain/relief/relief.h"
 #include "terrain/terrain_scene.h"
 #include "terrain/trail/trails.h"
+#include "test/terrain/trail/straight_trail.h"
 
 namespace groundray::trail_test {
 namespace {
@@ -21,38 +22,6 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 
 constexpr double cell_m = 0.05;
-constexpr glm::dvec2 start{-30, -21};
-constexpr glm::dvec2 along{0.8, 0.6};
-constexpr glm::dvec2 left{-0.6, 0.8};
-constexpr double length_m = 70;
-constexpr double grade = 0.1, cross_slope = 0.05;
-
-// Plane that rises along the trail, and to its left.
-double plane_m(glm::dvec2 p) {
-  return 5 + grade * glm::dot(p - start, along) + cross_slope * glm::dot(p - start, left);
-}
-
-HeightGrid grid_of(auto height_m, double step_m = 1) {
-  const int samples = static_cast<int>(100 / step_m) + 1;
-  std::vector<float> heights;
-  for (int row = 0; row < samples; ++row) {
-    for (int column = 0; column < samples; ++column)
-      heights.push_back(
-          static_cast<float>(height_m(glm::dvec2(-50 + step_m * column, 50 - step_m * row))));
-  }
-  return HeightGrid({samples, samples}, {-50, 50}, {step_m, -step_m}, heights);
-}
-
-Trail::GroundHeight heights_of(const HeightGrid& dem) {
-  return [&dem](glm::dvec2 p) { return dem.height_m_at(p); };
-}
-
-TrailSpec straight() {
-  return {.name = "track",
-          .waypoints_m = {start, start + 0.4 * length_m * along, start + length_m * along},
-          .bank_slope = 0.5,
-          .relief_share = 1};
-}
 
 Trail trail_on(const TrailSpec& spec, const auto& height_m) {
   return {spec, [&](glm::dvec2 p) { return std::optional<double>(height_m(p)); }, {0, 0}, cell_m};
@@ -65,39 +34,11 @@ double height_m(const Trail& trail, const auto& ground_m, double along_m, double
   return shape.height_m;
 }
 
-// The cross-section: parts of polynomials of the distance u from the middle, written as in
-// docs/reference/trails.md.
-double bump(double u, double width) {
-  return std::abs(u) < width / 2 ? std::pow(1 - std::pow(2 * u / width, 2), 2) : 0;
-}
-
 TEST(Trail, CrossSectionOnAPlaneIsItsClosedForm) {
-  TrailSpec spec = straight();
-  spec.width_m = 4;
-  spec.crown_m = 0.12;
-  spec.ruts = {.track_m = 1.8, .width_m = 0.4, .depth_m = 0.09, .berm_m = 0.03};
-  spec.ditches = {.width_m = 1.2, .depth_m = 0.4, .side = TrailSpec::Ditches::Side::Right};
-  const Trail trail = trail_on(spec, plane_m);
+  const Trail trail = trail_on(with_ruts_and_a_ditch(), plane_m);
   for (double s = 6; s < length_m - 6; s += 0.37) {
-    const double level_m = 5 + grade * s;
-    for (double u = -8; u <= 8; u += 0.013) {
-      double expected_m = level_m;
-      if (std::abs(u) < 2) {
-        expected_m += 0.12 * (1 - u * u / 4);
-        for (const double centre : {-0.9, 0.9}) {
-          expected_m -= 0.09 * bump(u - centre, 0.4);
-          for (const double side : {-0.3, 0.3}) expected_m += 0.03 * bump(u - centre - side, 0.2);
-        }
-      } else if (-3.2 < u && u < 0) {
-        expected_m -= 0.4 * bump(u + 2.6, 1.2);
-      } else {  // the plane is higher on the left, where a bank is cut; on the right, one is raised
-        const double edge_m = u > 0 ? 2 : 3.2;
-        const double ground_m = level_m + cross_slope * u, bank_m = 0.5 * (std::abs(u) - edge_m);
-        expected_m =
-            u > 0 ? std::min(ground_m, level_m + bank_m) : std::max(ground_m, level_m - bank_m);
-      }
-      ASSERT_NEAR(height_m(trail, plane_m, s, u), expected_m, 1e-9) << s << ", " << u;
-    }
+    for (double u = -8; u <= 8; u += 0.013)
+      ASSERT_NEAR(height_m(trail, plane_m, s, u), section_m(s, u), 1e-9) << s << ", " << u;
   }
 }
 

@@ -1,0 +1,63 @@
+"""A field of 10^8 blades of grass: memory, time to the first frame, and rate of a lidar in it."""
+
+import os
+import subprocess
+import time
+from pathlib import Path
+
+import groundray
+import numpy as np
+from dataset_runs import PROGRAM, ROOT
+from plyfile import PlyData
+
+DEM = ROOT / "data/terrain/prairie_1m.tif"
+# Patches of 1500 blades on a square of 260 m, one for each square metre: 1.01e8 blades.
+FIELD = """\
+scatter:
+  - {name: grass, label: 2, rows: {spacing_m: [1, 1], jitter_m: 0.3}, density_per_m2: 1,
+     area_m: [[429322, 5150555], [429582, 5150815]],
+     models: [{asset: grass_patch, variant: 1}, {asset: grass_patch, variant: 2},
+              {asset: grass_patch, variant: 3}, {asset: grass_patch, variant: 4}]}
+"""
+SCENE = f"""\
+groundray: 1
+seed: 4
+duration_s: 0.3
+terrain: {{dem: {DEM}, material: dry_soil}}
+platform: {{drive: {{waypoints_m: [[429440, 5150660], [429448, 5150668]], speed_m_s: 8, height_m: 0.5}}}}
+lidars: [{{name: top, preset: velodyne_vlp16, mount: {{translation_m: [0, 0, 1.5]}}}}]
+"""
+
+
+def test_first_frame_takes_less_than_2_gb_and_a_minute(tmp_path):
+    (tmp_path / "field.yaml").write_text(SCENE + FIELD)
+    command = [PROGRAM, "generate", tmp_path / "field.yaml", "-o", tmp_path / "out", "--frames", "0"]
+    began = time.monotonic()
+    process = subprocess.Popen(list(map(str, command)), stdout=subprocess.DEVNULL)
+    _, status, usage = os.wait4(process.pid, 0)
+    seconds = time.monotonic() - began
+    assert status == 0
+    print(f"{seconds:.1f} s, {usage.ru_maxrss / 1024:.0f} MiB")
+    scan = PlyData.read(tmp_path / "out/lidar/top/000000.ply")["vertex"].data
+    assert (scan["label"] == 2).sum() > 5_000
+    assert usage.ru_maxrss * 1024 <= 2e9
+    assert seconds <= 60
+
+
+def scan_rate(scene):
+    """Returns pulses per CPU second of the best of several scans."""
+    lidar = scene.lidar("top")
+    best = np.inf
+    for _ in range(5):
+        began = time.process_time()
+        lidar.scan(frame=0)
+        best = min(best, time.process_time() - began)
+    return 1 / best
+
+
+def test_lidar_in_the_field_keeps_a_quarter_of_its_rate_on_bare_ground(tmp_path):
+    field = groundray.scene(SCENE + FIELD, folder=tmp_path)
+    bare = groundray.scene(SCENE, folder=tmp_path)
+    ratio = scan_rate(field) / scan_rate(bare)
+    print(f"ratio {ratio:.3f}")
+    assert ratio >= 0.25
