@@ -10,8 +10,8 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 PLANTS = 200_000
-# A head whose axis points ahead, high up: lines across the flight, within a degree of straight down.
-# Without a laser, each pulse is one ray and returns from what it hits first.
+# A head whose axis points ahead, high up: lines across the flight, within a degree of straight
+# down. Without a laser, each pulse is one ray and returns from what it hits first.
 LIDAR = """\
 groundray_lidar: 1
 model: Line scanner
@@ -45,7 +45,6 @@ def test_pulses_reach_the_ground_by_the_law_of_beer_and_lambert(tmp_path, kind, 
     crown_m2 = area_m2 * projection * clumping / -np.log(gap)
     # Crowns at random places cover each other at random, so their gaps multiply as leaves do.
     density_per_m2 = 1 / (crown_m2 * (1 - gap))
-    expected = np.exp(-1)
     side_m = min(700, int(np.sqrt(PLANTS / density_per_m2)))
     geometry = {"leaves": "geometry"} if leaves == "geometry" else {}
     (tmp_path / "lidar.yaml").write_text(LIDAR)
@@ -79,5 +78,5 @@ def test_pulses_reach_the_ground_by_the_law_of_beer_and_lambert(tmp_path, kind, 
     labels = np.concatenate([lidar.scan(t_s=t)["label"] for t in lidar.times_s])
     assert len(labels) > 20_000
     reached = (labels == 1).mean()
-    print(f"{kind}: {reached:.3f}, {len(labels)} pulses, {density_per_m2:.3g} per m2")
-    assert reached == pytest.approx(expected, abs=0.03)
+    # A standard error of 0.006 for the trees, which are few, and the table's rounding, 0.01.
+    assert reached == pytest.approx(np.exp(-1), abs=0.025)
