@@ -25,7 +25,7 @@ class Channels {
 
   void add_stages(ImagerStages& stages) {
     if (stages.picture)
-      std::visit([&](auto& pixels) { add("picture", std::move(pixels)); }, *stages.picture);
+      std::visit([&](auto& pixels) { add("picture", std::move(pixels)); }, stages.picture->picture);
     add_requested(Product::Irradiance, "irradiance_w_m2", stages.irradiance_w_m2);
     add_requested(Product::Photons, "photons", stages.photons);
     add_requested(Product::Electrons, "electrons", stages.electrons);

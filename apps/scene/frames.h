@@ -88,7 +88,7 @@ struct ImagerStages {
   ImageF photons;
   ImageF electrons;
   Image16 raw_dn;
-  std::optional<Picture> picture;  ///< if the camera's products include it
+  std::optional<DevelopedPicture> picture;  ///< if the camera's products include it
   double saturated_share = 0;      ///< fraction of the pixels that are saturated
 };
 

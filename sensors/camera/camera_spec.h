@@ -90,6 +90,9 @@ struct PictureSpec {
   /// Gains of red, green and blue. By default, grey surfaces in light of equal R, G and B appear
   /// grey.
   std::optional<glm::dvec3> gains = {};
+  bool balances_white = false;  ///< automatic white balance: gains from each image, not `gains`
+  /// Key of the tone curve: the level to which each image's log-mean luminance is lifted, 0 to 1.
+  std::optional<double> tone_key = {};
 };
 
 /// Parameters of one camera.

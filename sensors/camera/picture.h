@@ -14,6 +14,13 @@ namespace groundray {
 /// Image for viewing: red, green and blue, or grey.
 using Picture = std::variant<Image8, Image16>;
 
+/// A picture and what was chosen for it.
+struct DevelopedPicture {
+  Picture picture;
+  glm::dvec3 gains{1};  ///< factors of red, green and blue
+  double lift = 1;      ///< slope of the tone curve at black; 1 is no curve
+};
+
 /// Converts an imager's raw images to pictures. Immutable; any number of threads may use one.
 /// @see docs/theory/camera_imager.md
 class RawDeveloper {
@@ -21,24 +28,31 @@ class RawDeveloper {
   /// @throws Error listing every field that is out of bounds.
   RawDeveloper(const PictureSpec& spec, const ImagerSpec& imager);
 
-  /// Returns the factors of red, green and blue.
+  /// Returns the factors of red, green and blue, without automatic white balance.
   const glm::dvec3& gains() const noexcept { return gains_; }
 
   /// Returns the picture of a raw image, encoded over the full range of the requested bit depth.
   /// Mosaics are demosaiced bilinearly; their outermost pixels copy the colours of their inner
   /// neighbours.
   /// @throws Error unless `raw` has one channel and, for a mosaic, at least 3 x 3 px.
-  Picture develop(const Image16& raw) const;
+  DevelopedPicture develop(const Image16& raw) const;
 
  private:
-  template <typename T>
-  Image<T> encoded(const Image16& colors) const;
+  // By channel and raw value, scaled to 16 bits.
+  using Codes = std::array<std::vector<std::uint16_t>, 3>;
+
+  double linear(std::size_t raised) const noexcept;
+  glm::dvec3 balanced_gains(const Image16& colors) const;
+  double lift(const Image16& colors, const glm::dvec3& gains) const;
+  Codes codes(const glm::dvec3& gains, double lift) const;
 
   PictureSpec spec_;
   ColorFilter filter_;
-  int bits_;  // bit depth of raw images
+  double raised_;  // numbers of a raw image, scaled to 16 bits, in one digital number
+  double black_dn_;
+  double white_dn_;  // above black
   glm::dvec3 gains_;
-  std::array<std::vector<std::uint16_t>, 3> codes_;  // by channel and raw value, scaled to 16 bits
+  Codes fixed_;  // for gains_ without a tone curve
 };
 
 }  // namespace groundray

@@ -2,16 +2,18 @@
 
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
+#include <vector>
 
 #include "core/random.h"
 
 namespace groundray {
 
-/// Layer of clouds, thin compared with its height.
+/// Layer of clouds with a flat base.
 struct CloudSpec {
   double cover = 0.5;         ///< share of the layer that has clouds, 0 to 1; 1 is overcast
-  double optical_depth = 15;  ///< where a cloud is thickest, vertically; overcast everywhere
-  double height_m = 1500;     ///< above the ground
+  double optical_depth = 30;  ///< where a cloud is thickest, vertically; overcast everywhere
+  double height_m = 1500;     ///< of the base above the ground
+  double thickness_m = 700;   ///< where a cloud is thickest
   double size_m = 2000;       ///< of the largest clouds
   Seed variant{};             ///< selects their places
 };
@@ -27,7 +29,7 @@ class Clouds {
   /// @param width_m  of the area over which it is averaged, approximately.
   double vertical_depth(glm::dvec2 place_m, double width_m) const noexcept;
 
-  /// Intersection of a direction with the layer.
+  /// Intersection of a direction with the base of the layer.
   struct Crossing {
     double vertical_depth = 0;
     double cosine = 1;  ///< of the angle from the vertical there
@@ -38,7 +40,7 @@ class Clouds {
   /// @param width_rad  of the cone over which it is averaged, approximately.
   Crossing cross(const glm::dvec3& direction, double width_rad) const noexcept;
 
-  /// Returns the share of the sun's direct light that passes.
+  /// Returns the share of the sun's direct light that passes, with its disc a point.
   double sun_transmittance(const glm::dvec3& sun) const noexcept;
 
   /// Light that falls on the layer, and from a direction through clear air.
@@ -53,8 +55,15 @@ class Clouds {
                       const Lighting& lighting) const noexcept;
 
  private:
+  struct Step;
+  double noise(glm::dvec2 p, double width) const noexcept;
+  template <typename Act>
+  void march(const glm::dvec3& direction, double width_rad, const Act& act) const noexcept;
+  double depth_to_sun(const Step& at, const glm::dvec3& sun) const noexcept;
+
   CloudSpec spec_;
-  double threshold_ = 0;  // of the noise, above which there are clouds
+  double threshold_ = 0;        // of the noise, above which there are clouds
+  std::vector<float> lattice_;  // of all octaves, random numbers from 0 to 1
 };
 
 }  // namespace groundray

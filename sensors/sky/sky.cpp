@@ -1,5 +1,7 @@
 #include "sensors/sky/sky.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cmath>
 #include <glm/common.hpp>
@@ -7,6 +9,7 @@
 #include <glm/geometric.hpp>
 #include <glm/trigonometric.hpp>
 #include <numbers>
+#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -90,29 +93,34 @@ glm::dvec3 irradiance_of(const HosekWilkie& model) {
 ImageF cloudy_dome(const ClearSky& clear, const AnalyticSky& spec, const Sun& clear_sun) {
   constexpr int width = 2048, height = width / 2;
   const Clouds clouds(*spec.clouds);
-  Clouds::Lighting lighting{.sun = clear_sun.direction(),
-                            .sun_irradiance = clear_sun.irradiance(),
-                            .sky_irradiance = clear.horizontal_irradiance()};
+  const Clouds::Lighting lighting{.sun = clear_sun.direction(),
+                                  .sun_irradiance = clear_sun.irradiance(),
+                                  .sky_irradiance = clear.horizontal_irradiance()};
   ImageF image(width, height, channels);
-  glm::dvec3 irradiance = clouds.sun_transmittance(lighting.sun) * std::max(lighting.sun.z, 0.0) *
-                          lighting.sun_irradiance;
-  for (int y = 0; y < height; ++y) {
+  std::vector<glm::dvec3> rings(height / 2);  // sums over the pixels of a row
+  const auto put = [&](int x, int y, const glm::dvec3& radiance) {
+    for (int c = 0; c < channels; ++c) image.at(x, y)[c] = static_cast<float>(radiance[c]);
+  };
+  tbb::parallel_for(0, height / 2, [&](int y) {
     const double polar = pi * (y + 0.5) / height;
     const double level = math::sin(polar), up = math::cos(polar);
-    glm::dvec3 around(0);
     for (int x = 0; x < width; ++x) {
       const double azimuth = 2 * pi * ((x + 0.5) / width - 0.5);
       const glm::dvec3 direction(level * math::sin(azimuth), level * math::cos(azimuth), up);
-      glm::dvec3 radiance = spec.ground_albedo * irradiance / pi;  // known below the horizon
-      if (up > 0) {
-        lighting.clear_radiance = clear.radiance(direction);
-        radiance = clouds.radiance(direction, pi / height, lighting);
-        around += radiance;
-      }
-      for (int c = 0; c < channels; ++c) image.at(x, y)[c] = static_cast<float>(radiance[c]);
+      Clouds::Lighting seen = lighting;
+      seen.clear_radiance = clear.radiance(direction);
+      const glm::dvec3 radiance = clouds.radiance(direction, pi / height, seen);
+      put(x, y, radiance);
+      rings[static_cast<std::size_t>(y)] +=
+          radiance * (level * up * 2 * pi * pi / (double{width} * height));
     }
-    if (up > 0) irradiance += around * (level * up * 2 * pi * pi / (double{width} * height));
-  }
+  });
+  const glm::dvec3 irradiance =
+      std::accumulate(rings.begin(), rings.end(),
+                      clouds.sun_transmittance(lighting.sun) * std::max(lighting.sun.z, 0.0) *
+                          lighting.sun_irradiance);
+  for (int y = height / 2; y < height; ++y)
+    for (int x = 0; x < width; ++x) put(x, y, spec.ground_albedo * irradiance / pi);
   return image;
 }
 

@@ -141,12 +141,21 @@ void write_stages(const CameraSpec& camera, const ImagerStages& stages,
     write_exr(path_of("_electrons.exr"), {{{"Y"}, &stages.electrons}});
   if (gives(camera, Product::Raw)) write_png(path_of("_raw.png"), stages.raw_dn);
   if (stages.picture)
-    std::visit([&](const auto& image) { write_png(path_of(".png"), image); }, *stages.picture);
+    std::visit([&](const auto& image) { write_png(path_of(".png"), image); },
+               stages.picture->picture);
 }
 
-std::string exposure_text(const ExposureSetting& exposure, double saturated_share) {
-  return fmt::format("exposure_s: {:.9g}\ngain: {:.6g}\nsaturated: {:.6g}\n", exposure.exposure_s,
-                     exposure.gain, saturated_share);
+// Writes what was chosen for an image: its exposure and, if automatic, the picture's.
+std::string exposure_text(const ExposureSetting& exposure, const PictureSpec& spec,
+                          const ImagerStages& stages) {
+  std::string text = fmt::format("exposure_s: {:.9g}\ngain: {:.6g}\nsaturated: {:.6g}\n",
+                                 exposure.exposure_s, exposure.gain, stages.saturated_share);
+  if (!stages.picture) return text;
+  const auto& [picture, gains, lift] = *stages.picture;
+  if (spec.balances_white)
+    text += fmt::format("white_balance: [{:.6g}, {:.6g}, {:.6g}]\n", gains.r, gains.g, gains.b);
+  if (spec.tone_key) text += fmt::format("tone_lift: {:.6g}\n", lift);
+  return text;
 }
 
 // Returns the last scan that has begun by the middle of the image's time, or the first scan.
@@ -239,7 +248,7 @@ ImageFigures write_image(const Simulation& simulation, const DatasetWriter& data
   if (made.light)
     if (const auto stages = simulate_imager(simulation, which, image, made)) {
       write_stages(camera, *stages, path_of);
-      write_text(path_of(exposure_suffix), exposure_text(made.exposure, stages->saturated_share));
+      write_text(path_of(exposure_suffix), exposure_text(made.exposure, camera.picture, *stages));
       written.saturated_share = stages->saturated_share;
     }
   write_png(path_of("_preview.png"), draw_image_preview(made.light ? &*made.light : nullptr,

@@ -28,6 +28,8 @@ constexpr Rule exposure_rule{[](double value) { return value >= 1e-6 && value <=
 constexpr Rule percentile_rule{[](double value) { return value > 0 && value <= 100; },
                                "must be > 0 and at most 100"};
 constexpr double grey_target = 0.18;  // mean level that makes a scene of average reflectance grey
+constexpr Rule key_rule{[](double value) { return value > 0 && value < 1; },
+                        "must be between 0 and 1"};
 constexpr Rule row_rule{[](double value) { return value >= 0 && value <= 1e6; },
                         "must be from 0 to 1e6"};
 
@@ -162,6 +164,15 @@ void read_imager(Map map, std::optional<ImagerSpec>& into, Faults& faults) {
   into = imager;
 }
 
+void read_tone_curve(const Node& node, std::optional<double>& key, Faults& faults) {
+  if (node.text == "off") return key.reset();
+  double value = key.value_or(grey_target);
+  Map map(node, "tone_curve", faults);
+  map.read_number("key", Need::Optional, value, key_rule);
+  map.close();
+  key = value;
+}
+
 void read_picture(Map map, PictureSpec& picture, Faults& faults) {
   map.read_choice("encoding", Need::Optional, picture.encoding, {"srgb", "linear"});
   std::uint8_t bits = 0;
@@ -172,8 +183,17 @@ void read_picture(Map map, PictureSpec& picture, Faults& faults) {
       faults.add(*at, "bits", "is {}, but must be 8 or 16", bits);
     }
   }
+  // Of fixed gains and automatic white balance, that which the scene sets replaces the file's.
   glm::dvec3 gains(1);
-  if (map.read_vector("gains", Need::Optional, gains, positive)) picture.gains = gains;
+  const bool has_gains = map.read_vector("gains", Need::Optional, gains, positive) != nullptr;
+  if (has_gains) picture.balances_white = false;
+  if (map.read_choice<bool>("white_balance", Need::Optional, picture.balances_white,
+                            {{"fixed", false}, {"automatic", true}})) {
+    picture.gains.reset();
+  }
+  if (has_gains) picture.gains = gains;
+  if (const Node* const curve = map.find("tone_curve", Need::Optional))
+    read_tone_curve(*curve, picture.tone_key, faults);
   map.close();
 }
 

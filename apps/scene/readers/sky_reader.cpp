@@ -68,6 +68,7 @@ CloudSpec read_clouds(Map map) {
   map.read_number("cover", Need::Required, clouds.cover, share_rule);
   map.read_number("optical_depth", Need::Optional, clouds.optical_depth, not_negative);
   map.read_number("height_m", Need::Optional, clouds.height_m, positive);
+  map.read_number("thickness_m", Need::Optional, clouds.thickness_m, positive);
   map.read_number("size_m", Need::Optional, clouds.size_m, positive);
   map.read_whole("variant", Need::Optional, clouds.variant.value);
   map.close();

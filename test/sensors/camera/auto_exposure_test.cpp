@@ -71,7 +71,8 @@ std::vector<double> picture(const CameraSpec& camera, const ImageF& radiance,
   spec.gain_dn_e *= chosen.gain;
   const Imager imager(spec, chosen.exposure_s);
   const ImageF electrons = imager.electrons(imager.photons(irradiance(radiance, even_pupil())), {});
-  const Picture picture = RawDeveloper(camera.picture, spec).develop(imager.digital(electrons, {}));
+  const Picture picture =
+      RawDeveloper(camera.picture, spec).develop(imager.digital(electrons, {})).picture;
   std::vector<double> values;
   for (const std::uint16_t value : std::get<Image16>(picture).values())
     values.push_back(value / 65535.0);

@@ -71,20 +71,62 @@ TEST(Clouds, NoCloudsAreTheClearSky) {
             1e-3 * glm::length(clear.dome_irradiance()));
 }
 
-// Overcast of depth 30 lets no direct light through, and diffuse light by two streams:
-// T = 2 / (2 + (1 - g) depth). What comes down is T times what falls on the layer, less
-// exp(-1.66 depth) = 2e-22 of it, and single scattering; its radiance is the same in all
-// directions.
+// Overcast of depth 30 lets no direct light through, and diffuse light by two streams: at a depth t
+// below its top, the light is T(t) = 2 / (2 + (1 - g) t) of what falls on it. A direction of cosine
+// m sees the mean of T over the optical depth x, with t = 30 - x m, and haze in front. Parts of the
+// path are 1.5 / m deep and have the T of their middle, although their front counts more: 1 %.
 TEST(Clouds, OvercastTransmitsByTwoStreams) {
   const Sky clear(clear_sky()), sky(sky_with({.cover = 1, .optical_depth = 30}));
   EXPECT_LT(glm::length(sky.sun()->irradiance()), 1e-15 * glm::length(clear.sun()->irradiance()));
   const glm::dvec3 falling =
       clear.dome_irradiance() + clear.sun()->irradiance() * clear.sun()->direction().z;
-  const glm::dvec3 expected = falling * (2 / (2 + 0.15 * 30));
-  EXPECT_LT(glm::distance(sky.dome_irradiance(), expected), 1e-3 * glm::length(expected));
-  const glm::dvec3 zenith = sky.dome_radiance({0, 0, 1}), low = sky.dome_radiance({0.8, 0, 0.6});
-  EXPECT_LT(glm::distance(zenith, expected / std::numbers::pi), 1e-3 * glm::length(zenith));
-  EXPECT_LT(glm::distance(zenith, low), 1e-5 * glm::length(zenith));
+  for (const glm::dvec3& direction : {glm::dvec3(0, 0, 1), glm::dvec3(0.8, 0, 0.6)}) {
+    double mean = 0;
+    constexpr double dx = 1e-3;
+    for (double x = dx / 2; x < 30; x += dx)
+      mean += dx * std::exp(-x) * 2 / (2 + 0.15 * (30 - x * direction.z));
+    const double near = std::exp(-1.515 / direction.z / 25);
+    const glm::dvec3 expected = near * mean * falling / std::numbers::pi +
+                                (1 - near) * (2 / (2 + 0.15 * 30)) * clear.dome_radiance(direction);
+    const glm::dvec3 seen = sky.dome_radiance(direction);
+    EXPECT_LT(glm::distance(seen, expected), 1.2e-2 * glm::length(expected));
+  }
+  // The layer as a whole passes T of what falls on it; haze and the slope of T within the depth
+  // that is seen, 0.15 / 6.5 of it, change that.
+  const glm::dvec3 passed = falling * (2 / (2 + 0.15 * 30));
+  EXPECT_LT(glm::distance(sky.dome_irradiance(), passed), 0.07 * glm::length(passed));
+}
+
+// Clouds to the north are seen in front of the sun, those to the south lit by it: their sides are
+// brighter than their bases are above, but no brighter than white, i.e. E / pi and forward
+// scattering.
+TEST(Clouds, SidesTowardsTheSunAreBright) {
+  const SkySpec spec{.dome = AnalyticSky{.clouds = CloudSpec{.cover = 0.4, .variant = Seed{5}}},
+                     .sun = SunSpec{.position = SunAngles{.azimuth_deg = 0, .elevation_deg = 35}}};
+  const Sky sky(spec), clear([&] {
+    SkySpec without = spec;
+    std::get<AnalyticSky>(without.dome).clouds.reset();
+    return without;
+  }());
+  const auto brightest = [&](double low_deg, double high_deg, double side) {
+    double most = 0;
+    for (double elevation_deg = low_deg; elevation_deg < high_deg; elevation_deg += 0.4) {
+      for (double azimuth_deg = -60; azimuth_deg < 60; azimuth_deg += 0.4) {
+        const double up = elevation_deg * std::numbers::pi / 180;
+        const double turn = azimuth_deg * std::numbers::pi / 180;
+        const glm::dvec3 direction(std::cos(up) * std::sin(turn),
+                                   side * std::cos(up) * std::cos(turn), std::sin(up));
+        most = std::max(most, sky.dome_radiance(direction).g);
+      }
+    }
+    return most;
+  };
+  const double white =
+      (clear.sun()->irradiance().g * clear.sun()->direction().z + clear.dome_irradiance().g) /
+      std::numbers::pi;
+  const double lit = brightest(12, 30, -1), base = white * 2 / (2 + 0.15 * 30);
+  EXPECT_GT(lit, 2 * base);
+  EXPECT_LT(lit, 1.1 * white);
 }
 
 TEST(Clouds, SunBehindCloudsIsDimmedByTheirDepth) {
@@ -97,9 +139,13 @@ TEST(Clouds, SunBehindCloudsIsDimmedByTheirDepth) {
 }
 
 TEST(Clouds, ErrorListsEveryFault) {
-  EXPECT_THAT([] { Clouds({.cover = 1.5, .optical_depth = -1, .height_m = 1, .size_m = 0}); },
-              ThrowsMessage<Error>(AllOf(HasSubstr("cover = 1.5"), HasSubstr("optical_depth = -1"),
-                                         HasSubstr("height_m = 1"), HasSubstr("size_m = 0"))));
+  EXPECT_THAT(
+      [] {
+        Clouds({.cover = 1.5, .optical_depth = -1, .height_m = 1, .thickness_m = 0, .size_m = 0});
+      },
+      ThrowsMessage<Error>(AllOf(HasSubstr("cover = 1.5"), HasSubstr("optical_depth = -1"),
+                                 HasSubstr("height_m = 1"), HasSubstr("thickness_m = 0"),
+                                 HasSubstr("size_m = 0"))));
 }
 
 }  // namespace
