@@ -177,14 +177,23 @@ std::string words_for(const AnalyticSky& sky, const ClearAir& air) {
   return fmt::format("{}, turbidity {}", clouds, air.turbidity);
 }
 
+double azimuth_deg(const glm::dvec2& towards) {
+  const double azimuth = glm::degrees(math::atan2(towards.x, towards.y));
+  return azimuth < 0 ? azimuth + 360 : azimuth;
+}
+
+void print_wind(const Wind& wind) {
+  print_text(stdout, "wind      {:g} m/s from {:.4g} degrees in W, turbulence {:g}\n",
+             wind.speed_m_s, azimuth_deg(-wind.towards), wind.turbulence);
+}
+
 void print_sky(const SkySpec& spec) {
   print_text(stdout, "sky       {}\n",
              std::visit([&](const auto& dome) { return words_for(dome, spec.air); }, spec.dome));
   if (!spec.sun) return;
   const Sun sun = sun_of(spec).value();
-  const double azimuth_deg = glm::degrees(math::atan2(sun.direction().x, sun.direction().y));
   print_text(stdout, "sun       elevation {:.2f}, azimuth {:.2f} degrees in W{}\n",
-             glm::degrees(sun.elevation_rad()), azimuth_deg < 0 ? azimuth_deg + 360 : azimuth_deg,
+             glm::degrees(sun.elevation_rad()), azimuth_deg(glm::dvec2(sun.direction())),
              sun.transmittance() < 1
                  ? fmt::format("; clouds let {:.2g} % of its light pass", 100 * sun.transmittance())
                  : "");
@@ -252,6 +261,7 @@ void print_scene(const Simulation& simulation) {
   print_content(simulation.scene_objects);
   print_materials(simulation);
   if (simulation.spec.sky) print_sky(*simulation.spec.sky);
+  if (simulation.spec.wind.speed_m_s > 0) print_wind(simulation.spec.wind);
   for (const PlacedLidar& lidar : simulation.lidars) print_lidar(lidar);
   for (const PlacedCamera& camera : simulation.cameras) print_camera(camera);
   for (const std::string& note : notes_of(simulation)) print_text(stdout, "note      {}\n", note);

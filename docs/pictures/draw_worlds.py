@@ -20,7 +20,7 @@ SCENES = (
     *("meadow", "forest_track", "gravel_pit", "desert_wash", "moor", "vineyard"),
     *("alpine_path", "river_bank", "burnt_forest", "tundra", "plantation", "stone_quarry"),
 )
-SAMPLES = 8
+SAMPLES = 4
 COLUMNS, WIDTH, GAP = 3, 400, 6
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from dataset_runs import SCENE, files, generate, groundray
+from dataset_runs import CAMERA, SCENE, files, generate, groundray
 from plyfile import PlyData
 
 PLANTS = """\
@@ -66,6 +66,15 @@ def test_scans_have_the_velocity_of_plants(whole):
     speed_m_s = np.sqrt(scan["vx"] ** 2 + scan["vy"] ** 2 + scan["vz"] ** 2)
     assert speed_m_s[scan["label"] == 1].max() == 0
     assert speed_m_s[scan["label"] == 5].max() > 0.05
+
+
+def test_info_states_the_wind(tmp_path):
+    for wind in (WIND, ""):
+        (tmp_path / "scene.yaml").write_text(SCENE + wind)
+        (tmp_path / "camera.yaml").write_text(CAMERA)
+        told = groundray("info", tmp_path / "scene.yaml")
+        assert told.returncode == 0, told.stderr
+        assert ("wind      9 m/s from 300 degrees in W" in told.stdout) == bool(wind)
 
 
 def test_light_sources_cannot_sway(tmp_path):
