@@ -4,8 +4,8 @@ scenes in data/scenes/worlds.
     pip install pillow pyyaml
     python3 docs/pictures/draw_worlds.py build/release/bin out/worlds [SCENE …]
 
-The pictures are the cameras' own, with 8 paths a pixel: a minute of two cores each. With names of
-scenes, only these are made anew, if out/worlds has the others.
+The pictures are the cameras' own, with 8 paths a pixel: one to four minutes of two cores each. With
+names of scenes, only these are made anew, if out/worlds has the others.
 """
 
 import pathlib
@@ -20,7 +20,7 @@ SCENES = (
     *("meadow", "forest_track", "gravel_pit", "desert_wash", "moor", "vineyard"),
     *("alpine_path", "river_bank", "burnt_forest", "tundra", "plantation", "stone_quarry"),
 )
-SAMPLES = 4
+SAMPLES = 8
 COLUMNS, WIDTH, GAP = 3, 400, 6
 
 
