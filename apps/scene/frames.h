@@ -89,7 +89,7 @@ struct ImagerStages {
   ImageF electrons;
   Image16 raw_dn;
   std::optional<DevelopedPicture> picture;  ///< if the camera's products include it
-  double saturated_share = 0;      ///< fraction of the pixels that are saturated
+  double saturated_share = 0;               ///< fraction of the pixels that are saturated
 };
 
 /// Simulates the imager and develops the picture.

@@ -91,7 +91,8 @@ struct PictureSpec {
   /// grey.
   std::optional<glm::dvec3> gains = {};
   bool balances_white = false;  ///< automatic white balance: gains from each image, not `gains`
-  /// Key of the tone curve: the level to which each image's log-mean luminance is lifted, 0 to 1.
+  /// Key of the tone curve, 0 to 1: the level to which its factor takes each image's log-mean
+  /// luminance, before bright values are compressed.
   std::optional<double> tone_key = {};
 };
 

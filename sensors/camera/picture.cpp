@@ -112,7 +112,7 @@ RawDeveloper::Codes RawDeveloper::codes(const glm::dvec3& gains, double lift) co
 }
 
 // Returns gains that make the light of the image grey, estimated as the sixth-power mean of each
-// channel over all pixels without a saturated one. The smallest is 1.
+// channel over all pixels without one that is nearly saturated. The smallest is 1.
 // @see Finlayson, Trezzi, Shades of gray and colour constancy (2004).
 glm::dvec3 RawDeveloper::balanced_gains(const Image16& colors) const {
   constexpr double saturated = 0.99, most = 2;
@@ -125,7 +125,7 @@ glm::dvec3 RawDeveloper::balanced_gains(const Image16& colors) const {
     const glm::dvec3 cubed = x * x * x;
     sum += cubed * cubed;
   }
-  if (!(std::min({sum.r, sum.g, sum.b}) > 0)) return gains_;
+  if (!(sum.g > 0)) return gains_;
   glm::dvec3 gains(1);
   for (const glm::length_t c : {0, 2}) {
     const double wanted = math::pow(sum.g / sum[c], 1.0 / 6);

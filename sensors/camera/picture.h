@@ -14,11 +14,11 @@ namespace groundray {
 /// Image for viewing: red, green and blue, or grey.
 using Picture = std::variant<Image8, Image16>;
 
-/// A picture and what was chosen for it.
+/// Picture, with its gains and tone curve.
 struct DevelopedPicture {
   Picture picture;
   glm::dvec3 gains{1};  ///< factors of red, green and blue
-  double lift = 1;      ///< slope of the tone curve at black; 1 is no curve
+  double lift = 1;      ///< slope of the tone curve at black; 1: none
 };
 
 /// Converts an imager's raw images to pictures. Immutable; any number of threads may use one.
@@ -31,9 +31,9 @@ class RawDeveloper {
   /// Returns the factors of red, green and blue, without automatic white balance.
   const glm::dvec3& gains() const noexcept { return gains_; }
 
-  /// Returns the picture of a raw image, encoded over the full range of the requested bit depth.
-  /// Mosaics are demosaiced bilinearly; their outermost pixels copy the colours of their inner
-  /// neighbours.
+  /// Returns the picture of a raw image and how it was made. The picture is encoded over the full
+  /// range of the requested bit depth. Mosaics are demosaiced bilinearly; their outermost pixels
+  /// copy the colours of their inner neighbours.
   /// @throws Error unless `raw` has one channel and, for a mosaic, at least 3 x 3 px.
   DevelopedPicture develop(const Image16& raw) const;
 

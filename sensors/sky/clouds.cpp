@@ -16,17 +16,19 @@ namespace groundray {
 namespace {
 
 constexpr double earth_radius_m = 6371e3;
-constexpr double asymmetry = 0.85;  // of scattering by droplets in visible light
+constexpr double asymmetry = 0.85;    // of scattering by droplets in visible light
+constexpr double diffusivity = 1.66;  // mean length of diffuse light's paths, relative to vertical
 constexpr int octaves = 7;
 constexpr double fading = 0.5;  // weight of an octave relative to the one before
 constexpr double all_weights = (1 - 1.0 / (1 << octaves)) / (1 - fading);
 constexpr int side = 256;            // of an octave's lattice, after which it repeats
 constexpr double ramp = 0.25;        // of the noise, from a cloud's edge to its full thickness
 constexpr int samples_across = 160;  // for the threshold
-constexpr int steps_up = 20;         // through the layer, from below
+constexpr int least_steps = 16;      // of a path through the layer
 constexpr double haze_m = 25e3;      // distance at which haze hides 1 - 1/e of a cloud
 constexpr int steps_to_sun = 12;
-constexpr double least_step = 0.03;  // relative to the distance
+constexpr double step_share = 0.03;  // of the distance: length of longer paths' steps
+constexpr double lowest_sun = 0.05;  // sine of its elevation, for paths towards it
 constexpr double opaque = 12;        // optical depth behind which nothing is seen
 
 double fade(double t) noexcept { return t * t * t * (t * (6 * t - 15) + 10); }
@@ -144,22 +146,24 @@ void Clouds::march(const glm::dvec3& direction, double width_rad, const Act& act
   const auto distance_to = [&](double up_m) {
     return std::sqrt(climb_m * climb_m + up_m * (2 * earth_radius_m + up_m)) - climb_m;
   };
-  const double level = std::sqrt(1 - direction.z * direction.z);
-  // Height above the base on the sphere, of second order in the angle at its centre.
-  const auto above_m = [&](double at_m) {
-    return at_m * direction.z + at_m * at_m * level * level / (2 * earth_radius_m) - spec_.height_m;
+  const double level = math::hypot(direction.x, direction.y);
+  const auto above_m = [&](double at_m) {  // the base
+    return math::hypot(earth_radius_m + at_m * direction.z, at_m * level) - earth_radius_m -
+           spec_.height_m;
   };
   const double extinction_per_m = spec_.optical_depth / spec_.thickness_m;
-  const auto inside_m = [&](double at_m) {  // below the top of the cloud
-    const double depth = vertical_depth(at_m * glm::dvec2(direction), at_m * width_rad);
+  const auto inside_m = [&](double at_m, double step_m) {  // below the top of the cloud
+    const double width_m = std::max(at_m * width_rad, step_m * level / 2);
+    const double depth = vertical_depth(at_m * glm::dvec2(direction), width_m);
     return depth > 0 ? depth / extinction_per_m - above_m(at_m) : -spec_.thickness_m;
   };
   const double end_m = distance_to(spec_.height_m + spec_.thickness_m);
-  double begin_m = distance_to(spec_.height_m), before_m = inside_m(begin_m);
+  double begin_m = distance_to(spec_.height_m);
+  const double most_m = (end_m - begin_m) / least_steps;
+  double before_m = inside_m(begin_m, std::min(step_share * begin_m, most_m));
   while (begin_m < end_m) {
-    const double step_m =
-        std::min(std::max(spec_.thickness_m / steps_up, least_step * begin_m), end_m - begin_m);
-    const double after_m = inside_m(begin_m + step_m);
+    const double step_m = std::min({step_share * begin_m, most_m, end_m - begin_m});
+    const double after_m = inside_m(begin_m + step_m, step_m);
     const double in_m = std::max(before_m, 0.0) + std::max(after_m, 0.0);
     if (in_m > 0) {
       const double share = in_m / (std::abs(before_m) + std::abs(after_m));
@@ -180,11 +184,12 @@ double Clouds::depth_to_sun(const Step& at, const glm::dvec3& sun) const noexcep
   const double extinction_per_m = spec_.optical_depth / spec_.thickness_m;
   if (std::isinf(threshold_)) return extinction_per_m * (spec_.thickness_m - at.above_m);
   const double rise_m = (spec_.thickness_m - at.above_m) / steps_to_sun;
-  const glm::dvec2 along = glm::dvec2(sun) / std::max(sun.z, 0.05);
+  const glm::dvec2 along = glm::dvec2(sun) / std::max(sun.z, lowest_sun);
+  const double width_m = rise_m * std::max(glm::length(along) / 2, 1.0);
   double inside_m = 0;
   for (int i = 0; i < steps_to_sun; ++i) {
     const double up_m = rise_m * (i + 0.5);
-    const double top_m = vertical_depth(at.place_m + along * up_m, rise_m) / extinction_per_m;
+    const double top_m = vertical_depth(at.place_m + along * up_m, width_m) / extinction_per_m;
     inside_m += std::clamp(top_m - (at.above_m + up_m - rise_m / 2), 0.0, rise_m);
   }
   return extinction_per_m * inside_m;
@@ -203,29 +208,34 @@ double Clouds::sun_transmittance(const glm::dvec3& sun) const noexcept {
 
 glm::dvec3 Clouds::radiance(const glm::dvec3& direction, double width_rad,
                             const Lighting& lighting) const noexcept {
-  const glm::dvec3 falling =
-      lighting.sun_irradiance * std::max(lighting.sun.z, 0.0) + lighting.sky_irradiance;
-  // Light scattered once, towards the sun, makes thin edges bright.
+  const glm::dvec3 from_sun = lighting.sun_irradiance * std::max(lighting.sun.z, 0.0);
   const glm::dvec3 once = lighting.sun_irradiance * phase_per_sr(glm::dot(direction, lighting.sun));
   const double sun_cosine = std::max(cross(lighting.sun, 0).cosine, 1e-3);
+  const double extinction_per_m = spec_.optical_depth / spec_.thickness_m;
+  // Air below clouds is darker than below a clear sky.
+  const glm::dvec3 air =
+      lighting.clear_radiance * (1 - spec_.cover * (1 - transmitted(spec_.optical_depth)));
   glm::dvec3 sum(0);
   double passed = 0;  // optical depth
-  double first_m = 0;
   march(direction, width_rad, [&](const Step& step) {
-    const double to_sun = depth_to_sun(step, lighting.sun);
+    const double depth = depth_to_sun(step, lighting.sun);
+    const double sunlit = math::exp(-depth / sun_cosine);
+    const double skylit = math::exp(-diffusivity * depth);
+    // Of the light that is not scattered yet, the cloud below the place returns what it does not
+    // pass.
+    const double returned = 1 - transmitted(extinction_per_m * step.above_m);
+    const double diffuse = transmitted(depth);
     const glm::dvec3 source =
-        falling * (transmitted(to_sun) / std::numbers::pi) + once * math::exp(-to_sun / sun_cosine);
-    sum += source * (math::exp(-passed) - math::exp(-passed - step.depth));
+        (from_sun * std::max(diffuse - (1 - returned) * sunlit, 0.0) +
+         lighting.sky_irradiance * std::max(diffuse - (1 - returned) * skylit, 0.0)) /
+            std::numbers::pi +
+        once * sunlit;
+    const double share = math::exp(-passed) - math::exp(-passed - step.depth);
+    sum += share * glm::mix(air, source, math::exp(-step.distance_m / haze_m));
     passed += step.depth;
-    if (first_m == 0) first_m = step.distance_m;
     return passed < opaque;
   });
-  const glm::dvec3 cloudy = sum + lighting.clear_radiance * math::exp(-passed);
-  // Air below clouds is darker, by what they pass on average.
-  const double lit = 1 - spec_.cover * (1 - transmitted(spec_.optical_depth));
-  return passed == 0
-             ? cloudy
-             : glm::mix(lit * lighting.clear_radiance, cloudy, math::exp(-first_m / haze_m));
+  return sum + lighting.clear_radiance * math::exp(-passed);
 }
 
 }  // namespace groundray

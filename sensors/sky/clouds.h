@@ -40,7 +40,7 @@ class Clouds {
   /// @param width_rad  of the cone over which it is averaged, approximately.
   Crossing cross(const glm::dvec3& direction, double width_rad) const noexcept;
 
-  /// Returns the share of the sun's direct light that passes, with its disc a point.
+  /// Returns the share of the sun's direct light that passes; the disc is taken as a point.
   double sun_transmittance(const glm::dvec3& sun) const noexcept;
 
   /// Light that falls on the layer, and from a direction through clear air.

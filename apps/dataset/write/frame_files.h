@@ -46,8 +46,9 @@ std::vector<ImagedEcho> show_echoes(const Simulation& simulation, std::size_t ca
                                     std::int64_t image, const OverlaidScan& shown,
                                     const PointCloud& echoes, const Scene& scene);
 
-/// Suffix of the file with an image's exposure time, its gain and the fraction of its pixels that
-/// are saturated; present if its camera has products of the imager.
+/// Suffix of the file with an image's exposure time, its gain, the fraction of its pixels that are
+/// saturated, and automatic settings of its picture; present if its camera has products of the
+/// imager.
 inline constexpr const char* exposure_suffix = "_exposure.yaml";
 
 /// Figures of a written image.

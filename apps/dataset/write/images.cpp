@@ -145,7 +145,7 @@ void write_stages(const CameraSpec& camera, const ImagerStages& stages,
                stages.picture->picture);
 }
 
-// Writes what was chosen for an image: its exposure and, if automatic, the picture's.
+// Returns the lines of an image's *_exposure.yaml.
 std::string exposure_text(const ExposureSetting& exposure, const PictureSpec& spec,
                           const ImagerStages& stages) {
   std::string text = fmt::format("exposure_s: {:.9g}\ngain: {:.6g}\nsaturated: {:.6g}\n",

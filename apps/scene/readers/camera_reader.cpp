@@ -15,6 +15,7 @@
 #include "sensors/camera/camera.h"
 #include "sensors/camera/imager.h"
 #include "sensors/camera/lens/lens.h"
+#include "sensors/camera/picture.h"
 
 namespace groundray::yaml {
 namespace {
@@ -183,15 +184,20 @@ void read_picture(Map map, PictureSpec& picture, Faults& faults) {
       faults.add(*at, "bits", "is {}, but must be 8 or 16", bits);
     }
   }
-  // Of fixed gains and automatic white balance, that which the scene sets replaces the file's.
+  // Fixed gains and automatic white balance exclude each other: a scene's choice replaces the
+  // file's.
   glm::dvec3 gains(1);
   const bool has_gains = map.read_vector("gains", Need::Optional, gains, positive) != nullptr;
   if (has_gains) picture.balances_white = false;
-  if (map.read_choice<bool>("white_balance", Need::Optional, picture.balances_white,
-                            {{"fixed", false}, {"automatic", true}})) {
-    picture.gains.reset();
+  const Node* const balance =
+      map.read_choice<bool>("white_balance", Need::Optional, picture.balances_white,
+                            {{"fixed", false}, {"automatic", true}});
+  if (picture.balances_white) picture.gains.reset();
+  if (has_gains && picture.balances_white) {
+    faults.add(*balance, "white_balance", "is automatic, but 'gains' are set too: remove either");
+  } else if (has_gains) {
+    picture.gains = gains;
   }
-  if (has_gains) picture.gains = gains;
   if (const Node* const curve = map.find("tone_curve", Need::Optional))
     read_tone_curve(*curve, picture.tone_key, faults);
   map.close();
@@ -319,6 +325,8 @@ void complete_camera(const Node& node, CameraSpec& camera, Faults& faults) {
   }
   if (camera.imager && !camera.aperture)
     faults.add(node, "imager", "needs an 'aperture', which determines how much light arrives");
+  if (camera.imager && camera.picture.balances_white && camera.imager->filter == ColorFilter::Mono)
+    faults.add(node, "picture", "has an automatic white_balance, but a mono imager has no colours");
   if (faults.count() > before) return;
   try {
     if (camera.aperture && camera.aperture->focal_length_m == 0) {
@@ -331,6 +339,8 @@ void complete_camera(const Node& node, CameraSpec& camera, Faults& faults) {
     }
     const Camera works(camera);
     if (camera.imager) Imager(*camera.imager, camera.shutter.exposure_s);
+    if (camera.imager && gives(camera, CameraProduct::Picture))
+      RawDeveloper(camera.picture, *camera.imager);
   } catch (const Error& fault) {
     faults.add(node, "", "the camera is invalid: {}", fault.what());
   }
