@@ -26,6 +26,7 @@ constexpr double ramp = 0.25;        // of the noise, from a cloud's edge to its
 constexpr int samples_across = 160;  // for the threshold
 constexpr int least_steps = 16;      // of a path through the layer
 constexpr double haze_m = 25e3;      // distance at which haze hides 1 - 1/e of a cloud
+constexpr int halvings = 5;          // of the step in which a path enters a cloud
 constexpr int steps_to_sun = 12;
 constexpr double step_share = 0.03;  // of the distance: length of longer paths' steps
 constexpr double lowest_sun = 0.05;  // sine of its elevation, for paths towards it
@@ -132,7 +133,7 @@ Clouds::Crossing Clouds::cross(const glm::dvec3& direction, double width_rad) co
 
 // Part of a path through the layer.
 struct Clouds::Step {
-  glm::dvec2 place_m;  // of its middle
+  glm::dvec2 place_m;  // of the mean of its light
   double above_m;      // the base
   double distance_m;
   double depth;  // optical, along the path
@@ -166,12 +167,23 @@ void Clouds::march(const glm::dvec3& direction, double width_rad, const Act& act
     const double after_m = inside_m(begin_m + step_m, step_m);
     const double in_m = std::max(before_m, 0.0) + std::max(after_m, 0.0);
     if (in_m > 0) {
-      const double share = in_m / (std::abs(before_m) + std::abs(after_m));
-      // The middle of what is in the cloud.
-      const double middle_m = begin_m + step_m * (before_m > 0 ? share / 2 : 1 - share / 2);
-      const Step step{middle_m * glm::dvec2(direction), above_m(middle_m), middle_m,
-                      extinction_per_m * step_m * share};
-      if (!act(step)) return;
+      double in_begin_m = begin_m;  // of what is in the cloud
+      double part_m = step_m * in_m / (std::abs(before_m) + std::abs(after_m));
+      if (before_m <= 0) {
+        double out_m = begin_m;
+        in_begin_m = begin_m + step_m;
+        for (int i = 0; i < halvings; ++i) {
+          const double middle_m = (out_m + in_begin_m) / 2;
+          (inside_m(middle_m, step_m) > 0 ? in_begin_m : out_m) = middle_m;
+        }
+        part_m = begin_m + step_m - in_begin_m;
+      }
+      // Mean of the distances from which the part's light comes, weighted by what passes.
+      const double depth = extinction_per_m * part_m;
+      const double seen = depth < 1e-6 ? depth / 2 : 1 - depth / math::expm1(depth);
+      const double at_m = in_begin_m + seen / extinction_per_m;
+      const Step step{at_m * glm::dvec2(direction), above_m(at_m), at_m, depth};
+      if (depth > 0 && !act(step)) return;
     }
     begin_m += step_m;
     before_m = after_m;
