@@ -27,7 +27,7 @@ constexpr int samples_across = 160;  // for the threshold
 constexpr int least_steps = 16;      // of a path through the layer
 constexpr double haze_m = 25e3;      // distance at which haze hides 1 - 1/e of a cloud
 constexpr int halvings = 5;          // of the step in which a path enters a cloud
-constexpr int steps_to_sun = 12;
+constexpr int steps_to_sun = 16;
 constexpr double step_share = 0.03;  // of the distance: length of longer paths' steps
 constexpr double lowest_sun = 0.05;  // sine of its elevation, for paths towards it
 constexpr double opaque = 12;        // optical depth behind which nothing is seen
@@ -195,14 +195,18 @@ void Clouds::march(const glm::dvec3& direction, double width_rad, const Act& act
 double Clouds::depth_to_sun(const Step& at, const glm::dvec3& sun) const noexcept {
   const double extinction_per_m = spec_.optical_depth / spec_.thickness_m;
   if (std::isinf(threshold_)) return extinction_per_m * (spec_.thickness_m - at.above_m);
-  const double rise_m = (spec_.thickness_m - at.above_m) / steps_to_sun;
+  // Steps grow with the distance, so that the first ones resolve the sunlit surface.
   const glm::dvec2 along = glm::dvec2(sun) / std::max(sun.z, lowest_sun);
-  const double width_m = rise_m * std::max(glm::length(along) / 2, 1.0);
-  double inside_m = 0;
-  for (int i = 0; i < steps_to_sun; ++i) {
-    const double up_m = rise_m * (i + 0.5);
-    const double top_m = vertical_depth(at.place_m + along * up_m, width_m) / extinction_per_m;
-    inside_m += std::clamp(top_m - (at.above_m + up_m - rise_m / 2), 0.0, rise_m);
+  const double stretch = std::max(glm::length(along) / 2, 1.0);
+  double inside_m = 0, from_m = 0;
+  for (int i = 1; i <= steps_to_sun; ++i) {
+    const double share = i / double{steps_to_sun};
+    const double to_m = (spec_.thickness_m - at.above_m) * share * share;
+    const double rise_m = to_m - from_m, middle_m = (from_m + to_m) / 2;
+    const double top_m =
+        vertical_depth(at.place_m + along * middle_m, rise_m * stretch) / extinction_per_m;
+    inside_m += std::clamp(top_m - (at.above_m + from_m), 0.0, rise_m);
+    from_m = to_m;
   }
   return extinction_per_m * inside_m;
 }
@@ -223,25 +227,21 @@ glm::dvec3 Clouds::radiance(const glm::dvec3& direction, double width_rad,
   const glm::dvec3 from_sun = lighting.sun_irradiance * std::max(lighting.sun.z, 0.0);
   const glm::dvec3 once = lighting.sun_irradiance * phase_per_sr(glm::dot(direction, lighting.sun));
   const double sun_cosine = std::max(cross(lighting.sun, 0).cosine, 1e-3);
-  const double extinction_per_m = spec_.optical_depth / spec_.thickness_m;
+  // Of the light that is not scattered yet, the cloud returns what it does not pass.
+  const double lost = transmitted(spec_.optical_depth);
   // Air below clouds is darker than below a clear sky.
-  const glm::dvec3 air =
-      lighting.clear_radiance * (1 - spec_.cover * (1 - transmitted(spec_.optical_depth)));
+  const glm::dvec3 air = lighting.clear_radiance * (1 - spec_.cover * (1 - lost));
   glm::dvec3 sum(0);
   double passed = 0;  // optical depth
   march(direction, width_rad, [&](const Step& step) {
     const double depth = depth_to_sun(step, lighting.sun);
     const double sunlit = math::exp(-depth / sun_cosine);
     const double skylit = math::exp(-diffusivity * depth);
-    // Of the light that is not scattered yet, the cloud below the place returns what it does not
-    // pass.
-    const double returned = 1 - transmitted(extinction_per_m * step.above_m);
     const double diffuse = transmitted(depth);
-    const glm::dvec3 source =
-        (from_sun * std::max(diffuse - (1 - returned) * sunlit, 0.0) +
-         lighting.sky_irradiance * std::max(diffuse - (1 - returned) * skylit, 0.0)) /
-            std::numbers::pi +
-        once * sunlit;
+    const glm::dvec3 source = (from_sun * std::max(diffuse - lost * sunlit, 0.0) +
+                               lighting.sky_irradiance * std::max(diffuse - lost * skylit, 0.0)) /
+                                  std::numbers::pi +
+                              once * sunlit;
     const double share = math::exp(-passed) - math::exp(-passed - step.depth);
     sum += share * glm::mix(air, source, math::exp(-step.distance_m / haze_m));
     passed += step.depth;
