@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/image/luminance.h"
 #include "core/image/srgb.h"
 #include "core/math.h"
 
