@@ -86,7 +86,7 @@ LIBRARIES = {
     r"OpenMesh/": r"reconstruction/mesh/(surface_mesh\.h|simplify/edge_collapse\.h)",
     r"sleef": r"core/math\.cpp",
     r"openssl/": r"apps/dataset/file_sum\.cpp",
-    r"yaml-cpp/": r"apps/scene/yaml_reader\.cpp",
+    r"yaml-cpp/": r"apps/scene/yaml_(reader|writer)\.cpp",
     r"(vtk|EGL/)": r"apps/view/.*",
     r"Q[A-Z]": r"apps/view/window/.*",
     r"(nanobind/|Python\.h)": r"apps/python/.*",

@@ -25,7 +25,8 @@ enum class RandomStream : std::uint32_t {
   ShotNoise,
   ReadNoise,
   FixedPattern,
-  Paths
+  Paths,
+  World
 };
 
 /// Key of one random block: equal keys give equal numbers on any thread, in any order.

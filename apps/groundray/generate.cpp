@@ -176,7 +176,7 @@ std::vector<std::string> saturation_notes(const Simulation& simulation, const Ta
 }
 
 void run(const fs::path& scene, const fs::path& out, const GenerateOptions& options, RunLog& log) {
-  const Simulation simulation = load_simulation(scene, options.seed);
+  const Simulation simulation = load_simulation(scene, options.seed, options.world);
   for (const std::string& note : notes_of(simulation)) print_error("note: {}\n", note);
   if (simulation.terrain.whole() == nullptr) {
     // Reports insufficient memory before anything is written.

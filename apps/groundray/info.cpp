@@ -250,6 +250,8 @@ void print_estimate(const Simulation& simulation, const RunEstimate& estimate) {
 
 void print_scene(const Simulation& simulation) {
   print_text(stdout, "seed      {}\n", simulation.spec.seed.value);
+  if (const auto& world = simulation.spec.world)
+    print_text(stdout, "world     {}: {}\n", world->number, world->drawn);
   print_text(stdout, "duration  {} s, {} tracing\n", simulation.spec.duration_s,
              simulation.spec.tracing == Tracing::Fast ? "fast" : "exact");
   print_text(stdout, "terrain   {}\n", simulation.spec.terrain.dem.string());

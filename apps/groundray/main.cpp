@@ -26,8 +26,9 @@ constexpr int failed = 1;
 constexpr int interrupted = 130;
 
 // Commands by task, for help.
-constexpr std::array<std::pair<const char*, const char*>, 7> tasks{
+constexpr std::array<std::pair<const char*, const char*>, 8> tasks{
     {{"generate", "Simulate sensors"},
+     {"sample", "Simulate sensors"},
      {"verify", "Simulate sensors"},
      {"merge", "Simulate sensors"},
      {"info", "Look at files and data"},
@@ -51,6 +52,7 @@ int run(int argc, char** argv) {
 
   std::vector<groundray::Command> commands;
   groundray::add_run_commands(app, commands);
+  commands.push_back(groundray::add_sample_command(app));
 
   std::filesystem::path file;
   auto* info = app.add_subcommand("info", "Describe a file, a dataset or a preset");

@@ -87,6 +87,7 @@ struct RunOptions {
   fs::path scene, out;
   bool resume = false;
   std::optional<std::uint64_t> seed;
+  std::optional<std::uint32_t> world;
   std::string shard, log, frames;
   std::vector<std::string> sensors;
   std::vector<fs::path> datasets;
@@ -107,9 +108,15 @@ struct RunOptions {
         ->required();
     command->add_option("-o,--output", out, "Folder for the dataset; created if missing")
         ->required();
+    auto* const of_seed = command->add_option(
+        "--seed", seed, "Seed of noise and scattered objects, instead of the scene's");
+    of_seed->check(whole());
     command
-        ->add_option("--seed", seed, "Seed of noise and scattered objects, instead of the scene's")
-        ->check(whole());
+        ->add_option("--world", world,
+                     "Number, from 0: make this one of the scene's worlds, whose values are drawn "
+                     "(docs/reference/sampling.md)")
+        ->check(whole())
+        ->excludes(of_seed);
     command->add_flag("--resume", resume,
                       "Continue an interrupted run in its folder: check all existing files and "
                       "create those that are missing or changed");
@@ -165,6 +172,7 @@ void add_run_commands(CLI::App& app, std::vector<Command>& commands) {
       {options->add_generate(app), [options] {
          generate(options->scene, options->out,
                   {.seed = options->seed ? std::optional(Seed{*options->seed}) : std::nullopt,
+                   .world = options->world,
                    .use = options->use(),
                    .part = options->part(),
                    .log = options->log});

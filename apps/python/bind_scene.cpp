@@ -55,10 +55,15 @@ SharedScene build(SceneSpec spec, SceneSource source, std::optional<std::uint64_
                                       std::make_shared<GroundTracers>());
 }
 
-SharedScene open_scene(const std::filesystem::path& path, std::optional<std::uint64_t> seed) {
+SharedScene open_scene(const std::filesystem::path& path, std::optional<std::uint64_t> seed,
+                       std::optional<std::uint32_t> world) {
+  if (seed && world) {
+    throw nb::value_error(
+        "load_scene: give seed or world, not both: the seed of a world follows from its number");
+  }
   return without_gil([&](const StopRequest& stop) {
     SceneSource source{.path = std::filesystem::absolute(path)};
-    return build(load_scene(path, data_folder() / "sensors"), std::move(source), seed, stop);
+    return build(load_scene(path, data_folder() / "sensors", world), std::move(source), seed, stop);
   });
 }
 
@@ -357,10 +362,12 @@ NaN outside of the DEM and in its holes. Objects are ignored.)")
                            fmt::join(sensor_names(scene.simulation.lidars), ", "),
                            fmt::join(sensor_names(scene.simulation.cameras), ", "));
       });
-  module.def("load_scene", &open_scene, "path"_a, "seed"_a = nb::none(),
+  module.def("load_scene", &open_scene, "path"_a, "seed"_a = nb::none(), nb::kw_only(),
+             "world"_a = nb::none(),
              R"(Loads a scene file (docs/reference/scene.md) and everything it names.
 
-`seed` replaces the scene's own. Ctrl-C stops the certification of a large DEM.
+`seed` replaces the scene's own. `world` is the number of one of the scene's worlds
+(docs/reference/sampling.md), whose values are drawn. Ctrl-C stops the certification of a large DEM.
 Raises groundray.Error, with a line for each fault: file, line, key, rule and likely fix.)");
   module.def("parse_scene", &parse_given, "text"_a, "path"_a, "seed"_a = nb::none(),
              "terrain"_a = nb::none(), "meshes"_a = std::map<std::string, Mesh>(),

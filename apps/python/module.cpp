@@ -11,6 +11,7 @@ NB_MODULE(_core, module) {
   groundray::python::bind_image(module);
   groundray::python::bind_sensors(module);
   groundray::python::bind_scene(module);
+  groundray::python::bind_worlds(module);
   groundray::python::bind_reconstruction(module);
   groundray::python::bind_dem(module);
   groundray::python::bind_golden(module);

@@ -169,10 +169,20 @@ void note_tolerance(const Simulation& simulation, Notes& notes) {
     look("camera", camera.spec.name, camera.X_DC);
 }
 
+void note_worlds(const SceneSpec& spec, Notes& notes) {
+  if (spec.worlds == 0) return;
+  notes.push_back(
+      fmt::format("worlds: the scene is read as written; --world chooses one of its {} worlds, "
+                  "whose values are "
+                  "drawn",
+                  spec.worlds));
+}
+
 }  // namespace
 
 std::vector<std::string> notes_of(const Simulation& simulation) {
   Notes notes;
+  note_worlds(simulation.spec, notes);
   note_weather(simulation, notes);
   note_air(simulation, notes);
   note_heights(simulation, notes);

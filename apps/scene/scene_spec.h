@@ -171,9 +171,17 @@ struct StereoSpec {
   std::string where;
 };
 
+/// World of a scene file whose values were drawn (docs/reference/sampling.md).
+struct DrawnWorld {
+  std::uint32_t number = 0;
+  std::string drawn;  ///< keys and values: a map of YAML in one line
+};
+
 /// Content of a scene file.
 struct SceneSpec {
-  std::string text;  ///< text of the file
+  std::string text;  ///< text of the file, or of a world of it
+  std::optional<DrawnWorld> world;
+  std::uint32_t worlds = 0;  ///< number of worlds of the file, if none of them is chosen
   Seed seed;
   Tracing tracing = Tracing::Fast;
   double duration_s = 0;

@@ -348,8 +348,9 @@ std::filesystem::path data_folder() {
   return own_folder() / "data";
 }
 
-Simulation load_simulation(const std::filesystem::path& scene, std::optional<Seed> seed) {
-  SceneSpec spec = load_scene(scene, data_folder() / "sensors");
+Simulation load_simulation(const std::filesystem::path& scene, std::optional<Seed> seed,
+                           std::optional<std::uint32_t> world) {
+  SceneSpec spec = load_scene(scene, data_folder() / "sensors", world);
   if (seed) spec.seed = *seed;
   Certifying progress;  // shows nothing unless the terrain is certified
   return build_simulation(std::move(spec), [&](double share) { progress.update(share); });

@@ -131,13 +131,15 @@ Exposed first_frame(const Simulation& simulation);
 std::filesystem::path data_folder();
 
 /// Loads a scene and all files that it names.
-/// @param seed  replaces the scene's own.
+/// @param seed   replaces the scene's own.
+/// @param world  chooses one of the worlds of the scene (docs/reference/sampling.md).
 /// @throws Error if a file is invalid; if the platform's trajectory ends before the run; if a
 ///         sensor is below ground at any time, or never within reach of the DEM; if the run is too
 ///         short for one sweep or one image; if a stereo pair cannot be rectified; if a camera is
 ///         in two pairs or is triggered during an exposure; or as pupil_sr.
 Simulation load_simulation(const std::filesystem::path& scene,
-                           std::optional<Seed> seed = std::nullopt);
+                           std::optional<Seed> seed = std::nullopt,
+                           std::optional<std::uint32_t> world = std::nullopt);
 
 /// Builds a scene that has been parsed, as load_simulation.
 /// @param progress  called from time to time during a long preparation of the terrain, with the

@@ -96,7 +96,7 @@ def test_what_an_alias_shares_changes_only_where_it_is_named(folder):
     [
         ("scene: scene.yaml\n", "params.yaml: shards is missing"),
         ("scene: scene.yaml\nshards: 0\nruns: [{}]\n", "shards = 0 must be a whole number from 1"),
-        ("scene: scene.yaml\nshards: 1\n", "it must have either vary or runs"),
+        ("scene: scene.yaml\nshards: 1\n", "it must have either vary, runs or worlds"),
         ("scene: scene.yaml\nshards: 1\nvary: {seed: 3}\n", "vary.seed must be a list"),
         ("scene: scene.yaml\nshards: 1\nruns: [3]\n", r"runs[0] must be a map"),
         ("scene: scene.yaml\nshards: 1\nruns: [{sky.moon.x: 3}]\n", "has no moon"),

@@ -114,6 +114,11 @@ std::uint64_t fingerprint(const Simulation& simulation) {
   return print.value();
 }
 
+std::string world_text(const SceneSpec& spec) {
+  if (!spec.world) return "";
+  return fmt::format("world: {}\ndrawn: {}\n", spec.world->number, spec.world->drawn);
+}
+
 }  // namespace
 
 std::vector<RunInput> run_inputs(const Simulation& simulation) {
@@ -139,12 +144,12 @@ std::vector<RunInput> run_inputs(const Simulation& simulation) {
 std::string run_header(const Simulation& simulation, const FrameChoice& choice) {
   const glm::dvec3 origin_m = simulation.terrain.header().origin_w_m;
   std::string text = fmt::format(
-      "groundray_dataset: 1\nversion: {}\nseed: {}\ntracing: {}\nfunctions: \"{:016x}\"\n"
+      "groundray_dataset: 1\nversion: {}\nseed: {}\n{}tracing: {}\nfunctions: \"{:016x}\"\n"
       "inputs: \"{:016x}\"\ntime_origin_s: {}\n"
       "origin_w_m: [{}, {}, {}]\ncrs: "
       "{}\ncrs_wkt: {}\nscene: "
       "{}\nsensors:\n",
-      yaml_text(GROUNDRAY_VERSION), simulation.spec.seed.value,
+      yaml_text(GROUNDRAY_VERSION), simulation.spec.seed.value, world_text(simulation.spec),
       simulation.spec.tracing == Tracing::Fast ? "fast" : "exact", math::fingerprint(),
       fingerprint(simulation), seconds_text(simulation.begin), origin_m.x, origin_m.y, origin_m.z,
       yaml_text(simulation.terrain.header().crs_name),

@@ -11,6 +11,7 @@ void bind_terrain(nanobind::module_& module);
 void bind_image(nanobind::module_& module);
 void bind_sensors(nanobind::module_& module);
 void bind_scene(nanobind::module_& module);
+void bind_worlds(nanobind::module_& module);
 void bind_reconstruction(nanobind::module_& module);
 void bind_dem(nanobind::module_& module);
 void bind_golden(nanobind::module_& module);

@@ -8,7 +8,9 @@
 #include <utility>
 
 #include "apps/scene/readers/readers.h"
+#include "apps/scene/sampling/world_sampler.h"
 #include "apps/scene/yaml_reader.h"
+#include "apps/scene/yaml_writer.h"
 #include "core/appearance/bsdf.h"
 #include "core/folder_names.h"
 #include "sensors/lidar/lidar.h"
@@ -55,6 +57,7 @@ namespace groundray {
 namespace {
 
 namespace fs = std::filesystem;
+using sampling::WorldSampler;
 using yaml::Faults;
 using yaml::Map;
 using yaml::Need;
@@ -187,20 +190,25 @@ SensorKind kind_of(const fs::path& preset) {
   return is_camera ? SensorKind::Camera : SensorKind::Lidar;
 }
 
-}  // namespace
-
-SceneSpec load_scene(const fs::path& path, const fs::path& preset_folder) {
-  return parse_scene(yaml::read_file(path), path, preset_folder);
+// Reads what dataset.yaml states of a world.
+std::optional<DrawnWorld> read_drawn(Map& root) {
+  auto world = root.map("world", Need::Optional);
+  if (!world) return std::nullopt;
+  DrawnWorld drawn;
+  world->read_whole("number", Need::Required, drawn.number);
+  if (world->map("drawn", Need::Required))
+    drawn.drawn = yaml::line_of(*world->find("drawn", Need::Required));
+  world->close();
+  return drawn;
 }
 
-SceneSpec parse_scene(const std::string& text, const fs::path& path,
-                      const fs::path& preset_folder) {
-  const Node node = yaml::parse(text, path);
-  refuse_others(node, path);
-  Faults faults(path);
+// Reads all of a scene but its text and its block `worlds`.
+SceneSpec read_scene(const Node& node, const fs::path& path, const fs::path& preset_folder,
+                     Faults faults) {
   SceneSpec scene;
-  scene.text = text;
   Map root(node, "", faults);
+  root.find("worlds", Need::Optional);
+  scene.world = read_drawn(root);
   const yaml::DataFolders folders{preset_folder};
   yaml::check_version(root, "groundray", faults);
   root.read_whole("seed", Need::Required, scene.seed.value);
@@ -230,6 +238,41 @@ SceneSpec parse_scene(const std::string& text, const fs::path& path,
   root.close();
   faults.throw_if_any();
   return scene;
+}
+
+}  // namespace
+
+SceneSpec load_scene(const fs::path& path, const fs::path& preset_folder,
+                     std::optional<std::uint32_t> world) {
+  return parse_scene(yaml::read_file(path), path, preset_folder, world);
+}
+
+SceneSpec parse_scene(const std::string& text, const fs::path& path, const fs::path& preset_folder,
+                      std::optional<std::uint32_t> world) {
+  const Node node = yaml::parse(text, path);
+  refuse_others(node, path);
+  Faults faults(path);
+  const auto worlds = WorldSampler::read(node, faults);
+  if (!world) {
+    SceneSpec scene = read_scene(node, path, preset_folder, std::move(faults));
+    scene.text = text;
+    scene.worlds = worlds ? worlds->count() : 0;
+    return scene;
+  }
+  faults.throw_if_any();
+  if (!worlds) {
+    throw Error("{}: it has no block `worlds`, so that there is no world {} to choose",
+                path.string(), *world);
+  }
+  const Node drawn = worlds->scene_of(*world);
+  try {
+    SceneSpec scene = read_scene(drawn, path, preset_folder, std::move(faults));
+    scene.text = yaml::text_of(drawn);
+    return scene;
+  } catch (const Error& fault) {
+    throw Error("{}\nin world {}, which `groundray sample --index {}` prints", fault.what(), *world,
+                *world);
+  }
 }
 
 LidarSpec load_lidar(const fs::path& path) { return parse_lidar(yaml::read_file(path), path); }

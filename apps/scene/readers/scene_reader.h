@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,16 +13,20 @@ namespace groundray {
 /// Reads a scene file (docs/reference/scene.md). Relative paths in it are relative to its folder; a
 /// preset's name is looked up in `preset_folder`. Files of sensors, materials, relief and the sky
 /// are read here; all other files that the scene names are not opened.
+/// @param world  number of one of the worlds of the scene (docs/reference/sampling.md), whose
+///               values are drawn; without it the scene is read as written.
 /// @throws Error with a line for each fault, in the order of the file: path:line:column, the key,
 ///         its value, the rule and a likely fix. Faults are unknown, repeated and missing keys,
 ///         wrong types, values out of range or in contradiction, unknown presets, files that cannot
 ///         be read, and invalid YAML.
-SceneSpec load_scene(const std::filesystem::path& path, const std::filesystem::path& preset_folder);
+SceneSpec load_scene(const std::filesystem::path& path, const std::filesystem::path& preset_folder,
+                     std::optional<std::uint32_t> world = std::nullopt);
 
 /// Parses a text already in memory like load_scene; `path` names the file in messages, and relative
 /// paths are relative to its folder.
 SceneSpec parse_scene(const std::string& text, const std::filesystem::path& path,
-                      const std::filesystem::path& preset_folder);
+                      const std::filesystem::path& preset_folder,
+                      std::optional<std::uint32_t> world = std::nullopt);
 
 /// Reads a lidar preset (docs/reference/sensors.md).
 /// @throws Error as load_scene.

@@ -11,9 +11,10 @@ from typing import NamedTuple
 
 import yaml
 
+from groundray._core import Worlds
 from groundray.dataset import Error, read_bytes, read_text
 
-_KEYS = ("scene", "shards", "vary", "runs")
+_KEYS = ("scene", "shards", "vary", "runs", "worlds")
 
 
 class Run(NamedTuple):
@@ -21,7 +22,7 @@ class Run(NamedTuple):
 
     name: str
     scene: bytes
-    parameters: str  # as text: "seed=3 sky.sun.elevation_deg=40"
+    parameters: str  # as text: "seed=3 sky.sun.elevation_deg=40", or "world=17"
 
 
 class Sweep(NamedTuple):
@@ -108,6 +109,24 @@ def _tables(table: dict[str, yaml.Node], path: Path) -> Iterator[tuple[str, dict
         yield f"runs[{i}]", _entries(each, path, f"runs[{i}]")
 
 
+def _worlds(node: yaml.Node, scene: Path, path: Path) -> list[Run]:
+    """Returns the runs of worlds whose values the scene's distributions give: N, or [from, to]."""
+    texts = [_text(each) for each in node.value] if isinstance(node, yaml.SequenceNode) else ["0"]
+    texts += [] if isinstance(node, yaml.SequenceNode) else [_text(node)]
+    if len(texts) != 2 or not all(text.isdecimal() for text in texts):
+        rule = "must be the number of worlds, or [from, to] of their numbers"
+        raise Error(f"{path}: worlds = {_text(node)} {rule}")
+    first, end = (int(text) for text in texts)
+    worlds = Worlds(scene)
+    if not first < end <= len(worlds):
+        rule = f"must be worlds of {scene}, which has {len(worlds)}, from 0 on"
+        raise Error(f"{path}: worlds = {_text(node)} {rule}")
+    return [
+        Run(f"{world:06}", worlds.scene_text(world).encode(), f"world={world}")
+        for world in range(first, end)
+    ]
+
+
 def read_sweep(path: Path) -> Sweep:
     """Reads PARAMS.yaml and the scene that it names. Raises Error with file and key."""
     table = _entries(_load(path), path, "the file")
@@ -117,12 +136,14 @@ def read_sweep(path: Path) -> Sweep:
     for key in ("scene", "shards"):
         if key not in table:
             raise Error(f"{path}: {key} is missing")
-    if ("vary" in table) == ("runs" in table):
-        raise Error(f"{path}: it must have either vary or runs")
+    if sum(key in table for key in ("vary", "runs", "worlds")) != 1:
+        raise Error(f"{path}: it must have either vary, runs or worlds")
     shards = _text(table["shards"])
     if not shards.isdecimal() or not 1 <= int(shards) <= 1_000_000:
         raise Error(f"{path}: shards = {shards} must be a whole number from 1 to 1000000")
     scene = path.parent / _text(table["scene"])
+    if "worlds" in table:
+        return Sweep(scene, int(shards), _worlds(table["worlds"], scene, path))
     whole = _load(scene)
     runs: list[Run] = []
     for place, parameters in _tables(table, path):
