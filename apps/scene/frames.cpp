@@ -108,10 +108,14 @@ MadeImage make_image(const Simulation& simulation, std::size_t camera, std::int6
       made.paths += static_cast<std::uint64_t>(samples);
   }
   if (gives_any(spec, {Product::Truth, Product::Bound, Product::Flow, Product::FlowFlo,
-                       Product::FlowKitti})) {
+                       Product::FlowKitti, Product::Boxes})) {
     if (check) check();
     made.truth = image_truth(placed.camera, scene, simulation.scene_objects.materials.in_colour(),
                              placed.X_DC, truth_request(placed, number));
+  }
+  if (gives(spec, Product::Boxes)) {
+    made.instances = imaged_instances(placed.camera, scene, simulation.scene_objects.boxes,
+                                      placed.X_DC, placed.begins[number], *made.truth, check);
   }
   return made;
 }

@@ -11,6 +11,7 @@
 #include "core/tracing/scene.h"
 #include "sensors/camera/auto_exposure.h"
 #include "sensors/camera/camera.h"
+#include "sensors/camera/image_boxes.h"
 #include "sensors/camera/image_truth.h"
 #include "sensors/camera/picture.h"
 #include "sensors/lidar/lidar.h"
@@ -59,6 +60,7 @@ LidarScan make_scan(const Simulation& simulation, std::size_t lidar, std::int64_
 struct MadeImage {
   std::optional<Exposure> light;
   std::optional<ImageTruth> truth;
+  std::vector<ImagedInstance> instances;  ///< if the camera's products include boxes
   std::vector<std::uint16_t> labels;  ///< labels of the channels of the light's coverage
   std::uint64_t paths = 0;            ///< number of light paths traced
   ExposureSetting exposure;           ///< exposure time and gain of the light

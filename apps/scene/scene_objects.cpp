@@ -346,6 +346,7 @@ SceneObjects build_scene_objects(const SceneSpec& spec, const Terrain& terrain,
     objects.objects = ObjectTracer(device, library.models(), std::move(assembly.placed),
                                    std::move(assembly.moving), std::move(assembly.sways));
   }
+  objects.boxes = InstanceBoxes(objects.objects);
   objects.memory_bytes += device.memory_bytes();
   return objects;
 }

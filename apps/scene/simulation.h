@@ -11,6 +11,7 @@
 #include "apps/scene/scene_spec.h"
 #include "core/geometry/trajectory.h"
 #include "core/image/image.h"
+#include "core/tracing/instance_box.h"
 #include "core/tracing/scene.h"
 #include "sensors/camera/camera.h"
 #include "sensors/lidar/lidar.h"
@@ -82,6 +83,7 @@ struct SceneObjects {
 
   GroundCover cover;  ///< empty if the ground has a single material without an image
   ObjectTracer objects;
+  InstanceBoxes boxes;  ///< of `objects`
   std::vector<ModelTruth> models;
   std::vector<ModelScene> shapes;  ///< distinct shapes of the models
   Materials materials;             ///< materials of the ground, if it has any, then of the models

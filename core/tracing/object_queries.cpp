@@ -67,6 +67,29 @@ Lean ObjectTracer::lean(std::uint32_t object, nanoseconds time) const noexcept {
   return impl_->sways[placed.model].lean(glm::dvec2(placed.p_DO), placed.scale, seconds(time));
 }
 
+ObjectTracer ObjectTracer::only(std::uint32_t instance) const {
+  const auto [first, count] = parts_of(instance);
+  std::vector<ModelScene> models;
+  std::vector<Sway> sways;
+  std::vector<PlacedObject> placed;
+  std::vector<MovingObject> moving;
+  for (std::uint32_t part = first; part < first + count; ++part) {
+    const std::uint32_t model = model_of(part);
+    const auto own = static_cast<std::uint32_t>(models.size());
+    models.push_back(impl_->models[model]);
+    if (!impl_->sways.empty()) sways.push_back(impl_->sways[model]);
+    const std::size_t index = part - 1;
+    if (index < impl_->placed.size()) {
+      placed.push_back(impl_->placed[index]);
+      placed.back().model = own;
+    } else {
+      moving.push_back(impl_->moving[index - impl_->placed.size()]);
+      moving.back().model = own;
+    }
+  }
+  return {impl_->device, std::move(models), std::move(placed), std::move(moving), std::move(sways)};
+}
+
 std::span<const ModelScene> ObjectTracer::models() const noexcept {
   if (impl_ == nullptr) return {};
   return impl_->models;

@@ -117,6 +117,10 @@ class ObjectTracer {
   /// @param object  its number, from 1.
   Lean lean(std::uint32_t object, std::chrono::nanoseconds time) const noexcept;
   std::span<const ModelScene> models() const noexcept;
+  /// Returns a tracer of one instance alone, whose objects are numbered from 1.
+  /// @param instance  its number, from 1.
+  /// @throws Error with Embree's message if Embree fails.
+  ObjectTracer only(std::uint32_t instance) const;
   /// Returns the velocity of a point that is fixed to an object, m/s in D; 0 while the object
   /// stands still.
   /// @param object  its number, from 1.

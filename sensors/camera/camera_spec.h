@@ -74,6 +74,7 @@ enum class CameraProduct {
   Flow,        ///< forward and backward flow, in the EXR file
   FlowFlo,     ///< forward flow, as Middlebury's .flo
   FlowKitti,   ///< forward flow, as KITTI's PNG
+  Boxes,       ///< boxes of the instances that the image shows, with their visibility
   Coverage,    ///< fraction of each pixel by label
   Irradiance,  ///< irradiance of the sensor
   Photons,     ///< photons on each pixel

@@ -48,6 +48,8 @@ struct LidarSpec {
   enum class NoReturns { Omit, Report };
   /// Output of the power received over time.
   enum class WaveformOutput { Omit, Keep };
+  /// Output of the boxes of the instances that a scan hit.
+  enum class Boxes { Omit, Report };
   /// Frame of x, y, z: S as each pulse fired, or S at the scan's stamp.
   enum class Points { AsFired, AtStamp };
 
@@ -62,6 +64,7 @@ struct LidarSpec {
   ErrorBound error_bound = ErrorBound::Omit;
   NoReturns no_returns = NoReturns::Omit;
   WaveformOutput waveforms = WaveformOutput::Omit;
+  Boxes boxes = Boxes::Omit;
   Points points = Points::AsFired;
 };
 

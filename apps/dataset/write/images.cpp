@@ -11,6 +11,7 @@
 #include <utility>
 #include <variant>
 
+#include "apps/dataset/write/boxes.h"
 #include "apps/dataset/write/frame_files.h"
 #include "apps/dataset/write/preview.h"
 #include "core/image/exr_io.h"
@@ -212,6 +213,7 @@ std::vector<std::string> image_suffixes(const MountedCamera& mounted) {
   };
   add(Product::FlowFlo, ".flo");
   add(Product::FlowKitti, "_flow.png");
+  add(Product::Boxes, boxes_suffix);
   add(Product::Irradiance, "_irradiance.exr");
   add(Product::Photons, "_photons.exr");
   add(Product::Electrons, "_electrons.exr");
@@ -244,6 +246,10 @@ ImageFigures write_image(const Simulation& simulation, const DatasetWriter& data
     const ImageF& flow_px = made.truth->forward.offset_px;
     written.flows_left_out =
         write_flows(camera, flow_px.width() > 0 ? flow_px : unknown_flow(camera.size_px), path_of);
+  }
+  if (gives(camera, Product::Boxes)) {
+    write_boxes(path_of(boxes_suffix), simulation.scene_objects, made.instances,
+                placed.begins[static_cast<std::size_t>(image)]);
   }
   if (made.light)
     if (const auto stages = simulate_imager(simulation, which, image, made)) {

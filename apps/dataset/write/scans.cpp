@@ -6,11 +6,13 @@
 #include <span>
 
 #include "apps/dataset/dataset_reader.h"
+#include "apps/dataset/write/boxes.h"
 #include "apps/dataset/write/frame_files.h"
 #include "apps/dataset/write/preview.h"
 #include "core/image/png_io.h"
 #include "core/io/npy_io.h"
 #include "core/io/ply_io.h"
+#include "sensors/lidar/scan_boxes.h"
 
 namespace groundray {
 namespace {
@@ -23,6 +25,7 @@ constexpr const char* wave_index_suffix = "_wave_index.npy";
 bool has_no_returns(const LidarSpec& lidar) {
   return lidar.no_returns == LidarSpec::NoReturns::Report;
 }
+bool has_boxes(const LidarSpec& lidar) { return lidar.boxes == LidarSpec::Boxes::Report; }
 bool has_waveforms(const LidarSpec& lidar) {
   return lidar.waveforms != LidarSpec::WaveformOutput::Omit;
 }
@@ -50,6 +53,7 @@ std::vector<std::string> scan_suffixes(const MountedLidar& mounted) {
   const LidarSpec& lidar = mounted.lidar;
   std::vector<std::string> suffixes{preview_suffix};
   if (has_no_returns(lidar)) suffixes.emplace_back(no_returns_suffix);
+  if (has_boxes(lidar)) suffixes.emplace_back(boxes_suffix);
   if (has_waveforms(lidar)) {
     suffixes.emplace_back(wave_suffix);
     suffixes.emplace_back(wave_index_suffix);
@@ -67,6 +71,12 @@ void write_scan(const Simulation& simulation, const DatasetWriter& dataset, std:
   write_png(path_of(preview_suffix),
             draw_preview(scan.echoes, lidar, simulation.terrain.ground(), frame));
   if (has_no_returns(lidar.spec.lidar)) write_ply(path_of(no_returns_suffix), scan.no_returns, {});
+  if (has_boxes(lidar.spec.lidar)) {
+    const auto stamp = lidar.lidar.pattern().stamp(frame);
+    const SceneObjects& objects = simulation.scene_objects;
+    write_boxes(path_of(boxes_suffix), objects,
+                scanned_instances(scan.echoes, objects.boxes, stamp), stamp);
+  }
   if (has_waveforms(lidar.spec.lidar)) {
     const Waveforms& waveforms = scan.waveforms;
     write_npy(path_of(wave_suffix), {{"", "<f4"}}, waveforms.power_w.size(),

@@ -35,8 +35,8 @@ constexpr Rule row_rule{[](double value) { return value >= 0 && value <= 1e6; },
                         "must be from 0 to 1e6"};
 
 // In the order of CameraProduct.
-constexpr std::array<std::string_view, 12> products{
-    "radiance", "truth",      "bound",   "flow",      "flow_flo", "flow_kitti",
+constexpr std::array<std::string_view, 13> products{
+    "radiance", "truth",      "bound",   "flow",      "flow_flo", "flow_kitti", "boxes",
     "coverage", "irradiance", "photons", "electrons", "raw",      "picture"};
 static_assert(products.size() == static_cast<std::size_t>(CameraProduct::Picture) + 1);
 

@@ -183,6 +183,7 @@ void change_lidar(Map& entry, const fs::path& path, LidarSpec& lidar, Faults& fa
   read_physics(entry, lidar, faults);
   entry.read_choice("error_bound", Need::Optional, lidar.error_bound, {"omit", "report"});
   entry.read_choice("no_returns", Need::Optional, lidar.no_returns, {"omit", "report"});
+  entry.read_choice("boxes", Need::Optional, lidar.boxes, {"omit", "report"});
   entry.read_choice("waveforms", Need::Optional, lidar.waveforms, {"omit", "keep"});
   entry.read_choice("points", Need::Optional, lidar.points, {"as_fired", "at_stamp"});
 }

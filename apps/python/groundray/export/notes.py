@@ -9,6 +9,7 @@ from groundray.dataset import Camera, Dataset, Lidar
 _OF_SCANS = {"pcd", "las", "laz", "npz"}
 _OF_CAMERAS = {"tum", "denoised"}
 _PRODUCTS = {
+    "_boxes.npy": "boxes are not exported",
     "_no_returns.ply": "tables of pulses without an echo are not exported",
     "_wave.npy": "waveforms are not exported",
 }
