@@ -1,5 +1,7 @@
 """Boxes of instances in scans and images, in the files of a run."""
 
+from itertools import pairwise
+
 import numpy as np
 import OpenEXR
 import pytest
@@ -10,8 +12,8 @@ from plyfile import PlyData
 MOVERS = """\
 objects:
   - {name: rock, label: 4, asset: rock, size_m: 2, at_m: [429446, 5150670], stance: on_slope}
-  - {name: car, label: 10, asset: pickup, drive: {waypoints_m: [[429452, 5150660], [429446, 5150668]],
-     speed_m_s: 8, height_m: 0}}
+  - {name: car, label: 10, asset: pickup,
+     drive: {waypoints_m: [[429452, 5150660], [429446, 5150668]], speed_m_s: 8, height_m: 0}}
   - {name: walker, label: 11, asset: person, drive: {waypoints_m: [[429450, 5150668],
      [429446, 5150672]], speed_m_s: 1.5, height_m: 0}}
 scatter:
@@ -143,7 +145,7 @@ def test_velocities_are_differences_of_positions(dataset):
                     track.append((stamp_s + box["time_s"], centre, box))
     assert all(len(track) >= 2 for track in tracks.values())
     for name, track in tracks.items():
-        for (t0, p0, before), (t1, p1, after) in zip(track, track[1:], strict=False):
+        for (t0, p0, before), (t1, p1, after) in pairwise(track):
             mean = (p1 - p0) / (t1 - t0)
             ends = [np.array([box[f"v{k}_m_s"] for k in "xyz"]) for box in (before, after)]
             # The car turns and pitches over rough ground between two sweeps.
