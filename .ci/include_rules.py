@@ -20,7 +20,8 @@ INCLUDE = re.compile(r'^ *# *include *(["<])([^">]+)[">]', re.MULTILINE)
 FOLDERS: dict[str, str] = {
     "apps/scene": "apps/scene/calibration apps/scene/readers",
     "apps/scene/calibration": "apps/scene",
-    "apps/scene/readers": "apps/scene apps/scene/calibration",
+    "apps/scene/readers": "apps/scene apps/scene/calibration apps/scene/sampling",
+    "apps/scene/sampling": "apps/scene",
     "core/appearance": "core core/geometry core/image",
     "core/geometry": "core",
     "core/image": "core core/io",

@@ -91,7 +91,7 @@ void print_world(const SampleOptions& options, const WorldSampler& worlds) {
   write_text(options.out, text);
 }
 
-void print_table(const SampleOptions& options, const WorldSampler& worlds) {
+void print_worlds(const SampleOptions& options, const WorldSampler& worlds) {
   const std::uint32_t count = options.count.value_or(worlds.count());
   if (count > worlds.count()) {
     throw Error(
@@ -116,7 +116,7 @@ void sample(const SampleOptions& options) {
   if (options.index) {
     print_world(options, worlds);
   } else {
-    print_table(options, worlds);
+    print_worlds(options, worlds);
   }
 }
 

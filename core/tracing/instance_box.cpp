@@ -20,7 +20,7 @@ glm::dquat heading(const glm::dquat& R_DO) noexcept {
   return {math::cos(half_rad), 0, 0, math::sin(half_rad)};
 }
 
-std::array<glm::dvec3, 8> corners_of(const ModelBounds& bounds) noexcept {
+std::array<glm::dvec3, 8> box_corners(const ModelBounds& bounds) noexcept {
   std::array<glm::dvec3, 8> corners{};
   for (unsigned i = 0; i < corners.size(); ++i) {
     corners[i] = {(i & 1u) != 0 ? bounds.high_m.x : bounds.low_m.x,
@@ -63,7 +63,7 @@ InstanceBox InstanceBoxes::at(std::uint32_t instance, std::chrono::nanoseconds t
       bounds.add(placed.p_DO + lean.leaning(placed.R_DO * (placed.scale * p_O)));
     };
     if (count == 1) {
-      for (const glm::dvec3& corner : corners_of(bounds_[placed.model])) add(corner);
+      for (const glm::dvec3& corner : box_corners(bounds_[placed.model])) add(corner);
       continue;
     }
     const TriangleMesh& mesh = objects_.models()[placed.model].model().mesh;

@@ -157,7 +157,7 @@ std::optional<PixelBox> projected(const InstanceBox& box, const Camera& camera, 
 }
 
 // Returns true if the camera is in the box, whose faces then surround it.
-bool is_inside(const InstanceBox& box, const glm::dvec3& p_D) noexcept {
+bool surrounds(const InstanceBox& box, const glm::dvec3& p_D) noexcept {
   const glm::dvec3 p_B = glm::conjugate(box.R_DB) * (p_D - box.p_DB);
   return glm::all(glm::lessThanEqual(glm::abs(p_B), 0.5 * box.size_m + 1e-3));
 }
@@ -177,7 +177,7 @@ ImagedInstance imaged(const Camera& camera, const Scene& scene, const InstanceBo
   measured.visible = shown.box;
   const Pose X_DC_then = X_DC.pose_at(time);
   std::optional<PixelBox> region;
-  if (!is_inside(measured.box, X_DC_then.translation_m))
+  if (!surrounds(measured.box, X_DC_then.translation_m))
     region = projected(measured.box, camera, X_DC_then);
   PixelBox searched = around;
   if (region) {

@@ -22,7 +22,7 @@ using yaml::Node;
 
 constexpr std::string_view block = "worlds";
 
-Node plain(std::string text) {
+Node plain_node(std::string text) {
   return {.kind = Node::Kind::Plain, .text = std::move(text), .items = {}};
 }
 
@@ -175,7 +175,7 @@ Node WorldSampler::scene_of(std::uint32_t world) const {
   Node scene = scene_;
   Node drawn{.kind = Node::Kind::Map, .text = {}, .items = {}};
   for (std::size_t i = 0; i < keys.size(); ++i) {
-    drawn.items.push_back(plain(keys[i]));
+    drawn.items.push_back(plain_node(keys[i]));
     drawn.items.push_back(values[i]);
   }
   std::vector<KeyPath> absent;  // removed last, because numbers of list items would change
@@ -192,12 +192,12 @@ Node WorldSampler::scene_of(std::uint32_t world) const {
     }
   }
   remove(scene, absent);
-  set(scene, {"seed"}, plain(fmt::format("{}", seed_of(world).value)));
+  set(scene, {"seed"}, plain_node(fmt::format("{}", seed_of(world).value)));
   remove(scene, {{std::string(block)}});
   set(scene, {"world"},
       {.kind = Node::Kind::Map,
        .text = {},
-       .items = {plain("number"), plain(fmt::format("{}", world)), plain("drawn"),
+       .items = {plain_node("number"), plain_node(fmt::format("{}", world)), plain_node("drawn"),
                  std::move(drawn)}});
   return scene;
 }
