@@ -118,11 +118,12 @@ def test_the_table_as_parquet_has_types_and_equal_values(folder):
 def test_check_finds_worlds_that_break_a_rule(folder):
     assert sample(folder, "--count", 20, "--check").returncode == 0
     scene = folder / "scene.yaml"
-    scene.write_text(VARIED.replace("[8, 65]", "[8, 95]"))
+    scene.write_text(VARIED.replace("{log_uniform: [500,", "{uniform: [-500,"))
     result = sample(folder, "--check", "--count", 300)
     assert result.returncode == 1
-    line = 1 + VARIED[: VARIED.index("sky.sun.elevation_deg")].count("\n")
-    assert f"scene.yaml:{line}:28: key 'elevation_deg': is 9" in result.stderr
+    line = 1 + VARIED[: VARIED.index("weather.visibility_m")].count("\n")
+    assert f"scene.yaml:{line}:27: key 'visibility_m': is -" in result.stderr
+    assert ", but must be > 0" in result.stderr
     assert "which `groundray sample --index" in result.stderr
     assert sample(folder, "--count", 300).returncode == 0
 
