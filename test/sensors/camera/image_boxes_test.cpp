@@ -114,7 +114,7 @@ TEST(ImageBoxes, TruncationOfABoardIsARatioOfLengths) {
   const Camera camera({.lens = Pinhole{centred(100, size_px)}, .size_px = size_px});
   const Trajectory X_DC = gliding(looking({0, 0, 0}, {1, 0, 0}), {});
   // At 10 m the image reaches 10 m to each side; a board of 6 m about y = 9 reaches from 6 to 12.
-  for (const auto [y_m, beside] : {std::pair(0.0, 0.0), {9.0, 1.0 / 3}, {11.0, 2.0 / 3}}) {
+  for (const auto& [y_m, beside] : {std::pair(0.0, 0.0), {9.0, 1.0 / 3}, {11.0, 2.0 / 3}}) {
     const Scene scene = scene_of(plane_ground(0, 0, -1000), {board(3)}, {{{10, y_m, 0}}});
     const auto instances = measure(camera, scene, X_DC);
     ASSERT_EQ(instances.size(), 1u);
