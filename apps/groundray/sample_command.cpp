@@ -54,11 +54,11 @@ std::string csv_field(const yaml::Node& value) {
 std::string table_of(const WorldSampler& worlds, std::uint32_t count) {
   std::string table = "world,seed";
   for (const std::string& key : worlds.keys()) table += "," + csv_field(key);
-  table += "\n";
+  table += '\n';
   for (std::uint32_t world = 0; world < count; ++world) {
     table += fmt::format("{},{}", world, worlds.seed_of(world).value);
     for (const yaml::Node& value : worlds.values_of(world)) table += "," + csv_field(value);
-    table += "\n";
+    table += '\n';
   }
   return table;
 }

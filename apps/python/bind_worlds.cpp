@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <filesystem>
 
+#include "apps/python/binding/arrays.h"
 #include "apps/python/binding/bind.h"
 #include "apps/scene/sampling/world_sampler.h"
 #include "apps/scene/yaml_writer.h"

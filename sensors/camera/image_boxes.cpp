@@ -88,7 +88,7 @@ class Silhouette {
     double count = 0;
     for (int y = region.low.y + step / 2; y <= region.high.y; y += step) {
       trace_row(y, region.low.x + step / 2, region.high.x, step, [&](int x) {
-        if (!contains(image, {x, y})) count += double{1} * step * step;
+        if (!contains(image, {x, y})) count += static_cast<double>(step) * step;
       });
     }
     return count;
@@ -134,24 +134,31 @@ class Silhouette {
   std::vector<int> columns_;
 };
 
+// Returns points of the unit cube's faces, on a lattice.
+std::vector<glm::dvec3> face_points() {
+  std::vector<glm::dvec3> points;
+  constexpr int last = face_steps;
+  for (int i = 0; i <= last; ++i) {
+    for (int j = 0; j <= last; ++j) {
+      const bool is_edge = i == 0 || i == last || j == 0 || j == last;
+      for (int k = 0; k <= last; k += is_edge ? 1 : last)
+        points.push_back(glm::dvec3(i, j, k) / double{last} - 0.5);
+    }
+  }
+  return points;
+}
+
 // Returns the rectangle of the images of a box's faces; nullopt if the lens does not image them
 // all.
 std::optional<PixelBox> projected(const InstanceBox& box, const Camera& camera, const Pose& X_DC) {
+  static const std::vector<glm::dvec3> points = face_points();
   PixelBox region;
   const glm::dquat R_CD = glm::conjugate(X_DC.rotation);
-  for (int axis = 0; axis < 3; ++axis) {
-    for (int i = 0; i <= face_steps; ++i) {
-      for (int j = 0; j <= 2 * face_steps + 1; ++j) {
-        glm::dvec3 place(0);
-        place[axis] = j % 2 == 0 ? -0.5 : 0.5;
-        place[(axis + 1) % 3] = double(i) / face_steps - 0.5;
-        place[(axis + 2) % 3] = double(j / 2) / face_steps - 0.5;
-        const glm::dvec3 p_D = box.p_DB + box.R_DB * (place * box.size_m);
-        const auto pixel = camera.lens().project(R_CD * (p_D - X_DC.translation_m));
-        if (!pixel) return std::nullopt;
-        region.add(glm::ivec2(glm::clamp(*pixel, -1e6, 1e6)));
-      }
-    }
+  for (const glm::dvec3& point : points) {
+    const glm::dvec3 p_D = box.p_DB + box.R_DB * (point * box.size_m);
+    const auto pixel = camera.lens().project(R_CD * (p_D - X_DC.translation_m));
+    if (!pixel) return std::nullopt;
+    region.add(glm::ivec2(glm::clamp(*pixel, -1e6, 1e6)));
   }
   return region;
 }
@@ -197,7 +204,7 @@ ImagedInstance imaged(const Camera& camera, const Scene& scene, const InstanceBo
   }
   const double beside = silhouette.beside(searched);
   if (measured.alone > 0)
-    measured.visible_share = std::min(1.0, double(measured.pixels) / measured.alone);
+    measured.visible_share = std::min(1.0, static_cast<double>(measured.pixels) / measured.alone);
   measured.truncated_share = beside / (beside + std::max(measured.alone, measured.pixels));
   return measured;
 }
