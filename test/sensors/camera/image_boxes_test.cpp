@@ -61,9 +61,9 @@ Counted count(const Camera& camera, const Scene& scene, const Trajectory& X_DC,
 // compared with images of the same scene, and of a scene with this object alone and no ground.
 void expect_counts(const CameraSpec& spec, std::uint64_t seed) {
   std::mt19937_64 random(seed);
-  std::uniform_real_distribution<double> near_far(2, 30), across(-0.7, 0.7), scale(0.3, 2.5);
+  std::uniform_real_distribution<double> near_far(4, 40), across(-0.7, 0.7), scale(0.2, 1.5);
   std::vector<PlacedObject> placed;
-  for (std::uint32_t i = 0; i < 40; ++i) {
+  for (std::uint32_t i = 0; i < 80; ++i) {
     const double x = near_far(random);
     placed.push_back({{x, across(random) * x, across(random) * x},
                       glm::angleAxis(0.3 * i, glm::normalize(glm::dvec3(1, 2, 3))),

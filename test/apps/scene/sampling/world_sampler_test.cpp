@@ -67,7 +67,7 @@ SceneSpec world_of(const std::string& text, std::uint32_t world) {
 
 // Texts of the value of each world at the only key that varies.
 std::vector<std::string> texts_of(const std::string& distribution, std::uint32_t count = 10000) {
-  const WorldSampler worlds = sampler_of(scene_with("    weather.x: " + distribution + "\n"));
+  const WorldSampler worlds = sampler_of(scene_with("    platform.x: " + distribution + "\n"));
   std::vector<std::string> texts;
   for (std::uint32_t world = 0; world < count; ++world)
     texts.push_back(yaml::line_of(worlds.values_of(world).front()));
@@ -139,11 +139,11 @@ TEST(WorldSampler, WholeNumbersChoicesAndPresencesHaveTheirProbabilities) {
 TEST(WorldSampler, ColumnsOfATableAreDrawnTogether) {
   const WorldSampler worlds = sampler_of(scene_with(R"(    season:
       table:
-        columns: [terrain.material, weather.rain_mm_h]
+        columns: [terrain.material, platform.rain_mm_h]
         rows: [[dry_grass, 0], [dry_soil, 0], [wet_soil, 8]]
         weights: [2, 1, 1]
 )"));
-  EXPECT_THAT(worlds.keys(), ElementsAre("terrain.material", "weather.rain_mm_h"));
+  EXPECT_THAT(worlds.keys(), ElementsAre("terrain.material", "platform.rain_mm_h"));
   std::map<std::string, double> counts;
   for (std::uint32_t world = 0; world < 10000; ++world) {
     const auto values = worlds.values_of(world);
