@@ -61,6 +61,45 @@ def test_a_sweep_makes_a_dataset_for_each_row_that_is_reproducible_alone(folder,
     assert "it has a run of scene.0001.yaml with scene_sha256" in capsys.readouterr().err
 
 
+WORLDS = """\
+worlds:
+  count: 50
+  vary: {lidars.front.mount.pitch_deg: {normal: [0, 2]}}
+"""
+
+
+def test_worlds_are_runs_of_a_sweep_that_equal_those_of_generate(folder, capsys):
+    scene = folder / "scene.yaml"
+    scene.write_text(scene.read_text() + WORLDS)
+    store = folder / "store"
+    given = ["sweep", table(folder, "scene: scene.yaml\nshards: 2\nworlds: [30, 32]\n")]
+    given += ["--store", store.as_uri(), "--groundray", PROGRAM, "--workers", 2]
+    assert cluster(*given) == 0
+    assert f"{store.as_uri()}/000031: world=31\n" in capsys.readouterr().out
+    assert {each.name for each in store.iterdir()} == {"000030", "000031"}
+    for world in (30, 31):
+        alone = groundray("generate", scene, "--world", world, "-o", folder / f"{world}")
+        assert alone.returncode == 0, alone.stderr
+        assert files(store / f"{world:06}/dataset") == files(folder / f"{world}")
+
+
+@pytest.mark.parametrize(
+    ("worlds", "message"),
+    [
+        ("51", "worlds = 51 must be worlds of "),
+        ("[7, 7]", "which has 50, from 0 on"),
+        ("many", "worlds = many must be the number of worlds, or [from, to]"),
+        ("3\nruns: [{}]", "it must have either vary, runs or worlds"),
+    ],
+)
+def test_worlds_that_a_scene_does_not_have_are_named(folder, capsys, worlds, message):
+    scene = folder / "scene.yaml"
+    scene.write_text(scene.read_text() + WORLDS)
+    text = f"scene: scene.yaml\nshards: 1\nworlds: {worlds}\n"
+    assert cluster("sweep", table(folder, text), "--store", "file:///tmp/none") == 1
+    assert message in capsys.readouterr().err
+
+
 def test_rows_are_the_product_of_the_varied_values(folder):
     sweep = read_sweep(table(folder, TABLE))
     assert (sweep.shards, sweep.scene) == (2, folder / "scene.yaml")
