@@ -10,6 +10,7 @@
 #include <numbers>
 #include <numeric>
 #include <optional>
+#include <string_view>
 #include <utility>
 
 #include "core/error.h"
@@ -80,18 +81,30 @@ void check_scatter(const ScatterSpec& spec) {
                   "remove one of them",
                   spec.min_distance_m);
   }
+  if (spec.clusters) {
+    const auto& [size_m, contrast] = *spec.clusters;
+    broken.unless(size_m > 0 && std::isfinite(size_m),
+                  "clusters: size_m = {} must be positive and finite", size_m);
+    broken.unless(contrast >= 0 && contrast <= 1, "clusters: contrast = {} must be from 0 to 1",
+                  contrast);
+    broken.unless(!spec.rows,
+                  "clusters have no meaning in rows, whose sites are given; remove one of them, or "
+                  "make gaps with a density map");
+  }
   broken.throw_if_any();
 }
 
 // Returns the density of darts of which `per_m2` are accepted.
-double darts_per_m2(double per_m2, double min_distance_m) {
+// @param where  of that density, for the message.
+double darts_per_m2(double per_m2, double min_distance_m, std::string_view where) {
   const double disc_m2 = pi / 4 * min_distance_m * min_distance_m;
   const double coverage = per_m2 * disc_m2;
   if (coverage > max_adsorption_coverage) {
     throw Error(
-        "a density of {} plants per m2 is too high for min_distance_m = {}: that distance permits "
+        "a density of {} plants per m2{} is too high for min_distance_m = {}: that distance "
+        "permits "
         "at most {:.5g} per m2, that density at most {:.5g} m",
-        per_m2, min_distance_m, max_adsorption_coverage / disc_m2,
+        per_m2, where, min_distance_m, max_adsorption_coverage / disc_m2,
         std::sqrt(max_adsorption_coverage / (pi / 4 * per_m2)));
   }
   return coverage > 0 ? thrown_for(coverage) / disc_m2 : per_m2;
@@ -171,6 +184,8 @@ struct Scatter::Impl {
   ClearedGround cleared;
   DartLattice lattice;
   std::optional<RowLattice> rows;
+  std::optional<ClusterField> clusters;
+  double highest_per_m2 = 0;         // of density and clusters
   Area area;                         // where both ground and density are defined
   glm::dvec2 origin_cell{0};         // cell of D's origin, whole numbers
   glm::dvec2 origin_in_cell_m{0};    // position of D's origin in that cell
@@ -195,7 +210,8 @@ Scatter::Impl::Impl(Ground where, DensityMap wish, const ScatterSpec& wishes, Se
   }
   std::partial_sum(spec.weights.begin(), spec.weights.end(), std::back_inserter(shares_up_to));
   for (double& share : shares_up_to) share /= shares_up_to.back();
-  if (density.max_per_m2() == 0) return;
+  highest_per_m2 = density.max_per_m2();
+  if (highest_per_m2 == 0) return;
   if (spec.rows) {
     lattice = {.seed = seed, .layer = spec.layer};
     lattice.per_m2 = 1 / (spec.rows->between_m * spec.rows->within_m);
@@ -208,7 +224,12 @@ Scatter::Impl::Impl(Ground where, DensityMap wish, const ScatterSpec& wishes, Se
     }
     return;
   }
-  const double darts = darts_per_m2(density.max_per_m2(), spec.min_distance_m);
+  if (spec.clusters && spec.clusters->contrast > 0) {
+    clusters.emplace(*spec.clusters, seed, spec.layer);
+    highest_per_m2 *= clusters->highest();
+  }
+  const double darts =
+      darts_per_m2(highest_per_m2, spec.min_distance_m, clusters ? ", in clusters," : "");
   const double side_m = cell_side_m(darts, spec.min_distance_m);
   lattice = {seed, spec.layer, side_m, darts, spec.min_distance_m};
   origin_cell = glm::floor(spec.origin_w_m / side_m);
@@ -219,7 +240,13 @@ Scatter::Impl::Impl(Ground where, DensityMap wish, const ScatterSpec& wishes, Se
     throw Error(
         "{} plants per m2 require cells of {} m, whose indices overflow at ({}, {}) m from W's "
         "origin; lower the density",
-        density.max_per_m2(), side_m, farthest.x, farthest.y);
+        highest_per_m2, side_m, farthest.x, farthest.y);
+  }
+  if (clusters && !(std::max(farthest.x, farthest.y) / spec.clusters->size_m < max_cell)) {
+    throw Error(
+        "clusters: cells of size_m = {} have indices that overflow at ({}, {}) m from W's origin; "
+        "make them larger",
+        spec.clusters->size_m, farthest.x, farthest.y);
   }
 }
 
@@ -271,7 +298,9 @@ std::vector<Placement> Scatter::Impl::tile(glm::ivec2 first, const Area& within)
     for (std::size_t k = begin; k < end; ++k) {
       const Dart dart = darts.dart(k);  // a copy: evaluating other darts may move it
       const glm::dvec2 p = place(dart);
-      const double wanted = per_m2_at(p) / density.max_per_m2();
+      double wanted = per_m2_at(p) / highest_per_m2;
+      // From the lattice's own coordinates, so that it does not depend on D's origin.
+      if (clusters) wanted *= clusters->at((glm::dvec2(dart.cell) + dart.at) * lattice.side_m);
       if (!within.contains(p) || !(dart.chance < wanted) || clearings.contains(p)) continue;
       const auto footing = footing_at(p);
       if (footing && darts.stands(k)) found.push_back(placed(dart.cell, dart.number, *footing));
@@ -306,14 +335,15 @@ void Scatter::Impl::refuse_too_many(const Area& within) const {
         "a density of up to {} plants per m2 on {:.3g} m2 requires {:.2g} candidate positions, "
         "more than {:.0g}; request a smaller area, lower the density, or move peaks of the map to "
         "a separate layer",
-        density.max_per_m2(), grown_m2, lattice.per_m2 * grown_m2, max_darts_in_all);
+        highest_per_m2, grown_m2, lattice.per_m2 * grown_m2, max_darts_in_all);
   }
   if (density.max_per_m2() * all_m2 <= max_placements) return;
   constexpr int steps = 256;
   double expected = 0;
   for (int i = 0; i < steps * steps; ++i) {
     const glm::dvec2 p = within.low_m + (glm::dvec2(i % steps, i / steps) + 0.5) * size_m / 256.0;
-    const double per_m2 = per_m2_at(p);
+    double per_m2 = per_m2_at(p);
+    if (clusters) per_m2 *= clusters->at(p + spec.origin_w_m);
     if (per_m2 > 0 && !cleared.contains(p) && footing_at(p)) expected += per_m2;
   }
   expected *= all_m2 / (steps * steps);

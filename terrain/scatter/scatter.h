@@ -16,6 +16,7 @@
 #include "terrain/ground.h"
 #include "terrain/lod/pass.h"
 #include "terrain/scatter/clearing.h"
+#include "terrain/scatter/cluster_field.h"
 #include "terrain/scatter/row_lattice.h"
 
 namespace groundray {
@@ -51,7 +52,8 @@ struct ScatterSpec {
   /// Sites of the plants, instead of random ones. The density then decides how many of the sites
   /// have plants; it is at most that of the sites.
   std::optional<Rows> rows;
-  Interval slope_deg{0, 90};  ///< angle between the normal of the facet and the vertical
+  std::optional<Clusters> clusters{};  ///< by which the density is multiplied; not with rows
+  Interval slope_deg{0, 90};           ///< angle between the normal of the facet and the vertical
   Interval height_m{-std::numeric_limits<double>::infinity(),
                     std::numeric_limits<double>::infinity()};
   Interval scale{1, 1};
@@ -83,8 +85,8 @@ struct Placement {
 Area area_of(const GridFrame& frame);
 
 /// Layer of plants over the whole ground. Whether a plant stands at a position is a function of
-/// seed, layer, minimum distance or rows, highest density, and of density, suitability, clearings
-/// and ground at that position alone. Immutable; any number of threads may query it.
+/// seed, layer, minimum distance or rows, clusters, highest density, and of density, suitability,
+/// clearings and ground at that position alone. Immutable; any number of threads may query it.
 class Scatter {
  public:
   /// Largest number of placements that are returned at once.
@@ -96,9 +98,9 @@ class Scatter {
   Scatter(Ground ground, DensityMap density, const ScatterSpec& spec, Seed seed);
 
   /// Returns the plants whose positions are in `area`, in order of their keys; a larger area
-  /// contains the same plants there. The expected number in any region is the integral of the
-  /// density times the suitability over the part of it that the limits permit and no clearing
-  /// excludes, with a relative error of at most 2e-4.
+  /// contains the same plants there. The expected number in any region, over all seeds, is the
+  /// integral of the density times the suitability over the part of it that the limits permit and
+  /// no clearing excludes, with a relative error of at most 2e-4.
   /// @throws Error for more than max_placements plants or 1e9 darts, or if samples of the ground
   ///         cannot be read.
   std::vector<Placement> placements(const Area& area = {}, const PassRunner& runner = {}) const;

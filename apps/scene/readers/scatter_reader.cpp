@@ -69,6 +69,14 @@ Rows read_rows(Map entry) {
   return rows;
 }
 
+Clusters read_clusters(Map entry) {
+  Clusters clusters;
+  entry.read_number("size_m", Need::Required, clusters.size_m, positive);
+  entry.read_number("contrast", Need::Optional, clusters.contrast, share_rule);
+  entry.close();
+  return clusters;
+}
+
 // Reads the keys that layers of `scatter` and species of an ecosystem have in common.
 void read_growth(Map& entry, ScatterLayer& layer, const Reading& with) {
   entry.read_text("name", Need::Required, layer.name);
@@ -116,6 +124,13 @@ ScatterLayer read_scatter_layer(Map entry, const Reading& with) {
   entry.read_number("min_distance_m", Need::Optional, scatter.min_distance_m, not_negative);
   read_interval(entry, "scale", scatter.scale, positive, with.faults);
   entry.read_number("sink_m", Need::Optional, scatter.sink_m);
+  if (auto clusters = entry.map("clusters", Need::Optional)) {
+    scatter.clusters = read_clusters(*std::move(clusters));
+    if (scatter.rows)
+      with.faults.add(*entry.find("clusters", Need::Optional), "clusters",
+                      "have no meaning in 'rows', whose sites are given: remove one of them, or "
+                      "make gaps with 'density_map'");
+  }
   entry.close();
   return layer;
 }
