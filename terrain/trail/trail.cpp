@@ -13,6 +13,7 @@
 
 #include "core/error.h"
 #include "core/math.h"
+#include "terrain/trail/line_noise.h"
 #include "terrain/trail/route.h"
 #include "terrain/trail/smooth_curve.h"
 
@@ -71,12 +72,25 @@ void check_details(const TrailSpec& spec, double cell_m, Violations& broken) {
     check_width(ditches->width_m, "ditches.width_m");
     check_height(ditches->depth_m, "ditches.depth_m");
   }
+  if (const auto& benches = spec.benches) {
+    check_width(benches->width_m, "benches.width_m");
+    broken.unless(
+        cell_m <= benches->height_m && benches->height_m <= most_size_m,
+        "benches.height_m = {} must be at least a cell of the relief, {}, and at most {}: "
+        "make it larger, or relief.cell_m smaller",
+        benches->height_m, cell_m, most_size_m);
+    broken.unless(0 <= benches->roughness_m && benches->roughness_m <= benches->width_m,
+                  "benches.roughness_m = {} must be from 0 to their width_m, {}",
+                  benches->roughness_m, benches->width_m);
+  }
   if (const auto& roots = spec.roots) {
     check_width(roots->width_m, "roots.width_m");
     check_height(roots->height_m, "roots.height_m");
     check_number(roots->per_100_m, "roots.per_100_m");
   }
 }
+
+BankProfile bank_of(const TrailSpec& spec) { return {spec.bank_slope, spec.benches, spec.variant}; }
 
 // Returns a valid specification, with waypoints.
 TrailSpec checked(const TrailSpec& spec, const Trail::GroundHeight& ground, glm::dvec2 origin_w_m,
@@ -95,10 +109,12 @@ TrailSpec checked(const TrailSpec& spec, const Trail::GroundHeight& ground, glm:
   in(spec.bank_slope, 0.01, 100, "bank_slope");
   in(spec.most_bank_m, 0, 100, "most_bank_m");
   in(spec.most_grade, 0, 10, "most_grade");
-  broken.unless(!(spec.most_bank_m / spec.bank_slope > most_reach_m),
+  const double run_m = bank_of(spec).run_m(spec.most_bank_m);
+  broken.unless(!(run_m > most_reach_m),
                 "most_bank_m = {}: such banks reach {:g} m, more than the limit of {} m: make it "
-                "smaller, or bank_deg larger",
-                spec.most_bank_m, spec.most_bank_m / spec.bank_slope, most_reach_m);
+                "smaller, or bank_deg larger{}",
+                spec.most_bank_m, run_m, most_reach_m,
+                spec.benches ? ", or benches higher or narrower" : "");
   in(spec.crown_m, 0, 10, "crown_m");
   in(spec.relief_share, 0, 1, "relief_share");
   in(spec.variation, 0, 1, "variation");
@@ -150,7 +166,7 @@ TangentLine line_of(const TrailSpec& spec, glm::dvec2 origin_w_m) {
 double reach_m(const TrailSpec& spec) {
   const double ditch_m = spec.ditches ? spec.ditches->width_m : 0;
   return spec.width_m / 2 +
-         std::max(ditch_m + spec.most_bank_m / spec.bank_slope, spec.width_m / 2);
+         std::max(ditch_m + bank_of(spec).run_m(spec.most_bank_m), spec.width_m / 2);
 }
 
 // Ridge of height 1 and width 1 about 0, without edges.
@@ -185,16 +201,10 @@ enum Purpose : std::uint32_t { DepthVariation = 1000, ShiftVariation, Potholes, 
 
 // Returns a smooth random function at the points of a line, from -1 to 1.
 std::vector<double> smooth_noise(const TangentLine& line, Seed variant, Purpose purpose) {
-  DetailRandom random(variant, purpose);
-  std::vector<double> knots(static_cast<std::size_t>(line.length_m() / variation_m) + 2);
-  for (double& knot : knots) knot = random.between(-1, 1);
+  const RandomKey key{.seed = variant, .sensor = purpose, .stream = RandomStream::Relief};
   std::vector<double> values;
-  for (std::size_t i = 0; i < line.points_m.size(); ++i) {
-    const double at = line.spacing_m * static_cast<double>(i) / variation_m;
-    const auto knot = std::min(static_cast<std::size_t>(at), knots.size() - 2);
-    values.push_back(
-        std::lerp(knots[knot], knots[knot + 1], smooth_step(at - static_cast<double>(knot))));
-  }
+  for (std::size_t i = 0; i < line.points_m.size(); ++i)
+    values.push_back(line_noise(key, line.spacing_m * static_cast<double>(i) / variation_m));
   return values;
 }
 
@@ -203,6 +213,7 @@ std::vector<double> smooth_noise(const TangentLine& line, Seed variant, Purpose 
 Trail::Trail(const TrailSpec& spec, const GroundHeight& ground, glm::dvec2 origin_w_m,
              double cell_m)
     : spec_(checked(spec, ground, origin_w_m, cell_m)),
+      bank_(bank_of(spec_)),
       field_(line_of(spec_, origin_w_m), reach_m(spec_)) {
   level(ground, origin_w_m);
   vary();
@@ -245,7 +256,7 @@ void Trail::level(const GroundHeight& ground, glm::dvec2 origin_w_m) {
     }
     for (const double side : {-1.0, 0.0, 1.0}) {
       // Where a bank of the largest height ends, it must have met the ground.
-      for (const double beyond_m : {0.0, spec_.most_bank_m / spec_.bank_slope}) {
+      for (const double beyond_m : {0.0, bank_.run_m(spec_.most_bank_m)}) {
         const double out_m = side * (edge_m(side) + beyond_m);
         const glm::dvec2 p = line.points_m[i] + out_m * left_of(line.tangents[i]);
         const double bank_m = ground(p).value_or(levels_m_[i]) - levels_m_[i];
@@ -362,11 +373,11 @@ void Trail::apply(glm::dvec2 p, Shape& ground) const noexcept {
   const double half_m = spec_.width_m / 2, out_m = std::abs(at->across_m);
   const double beyond_m = out_m - edge_m(at->across_m);
   const double level_m = along(levels_m_, at->along_m);
+  const double to_end_m = std::min(at->along_m, field_.line().length_m() - at->along_m);
   if (beyond_m > 0) {
-    const double rise_m = beyond_m * spec_.bank_slope;
+    const double rise_m = bank_.rise_m(beyond_m, *at, to_end_m);
     ground.height_m = std::clamp(ground.height_m, level_m - rise_m, level_m + rise_m);
   } else {  // details fade towards the ends
-    const double to_end_m = std::min(at->along_m, field_.line().length_m() - at->along_m);
     ground.height_m = level_m + smooth_step(to_end_m / spec_.width_m) * detail_m(*at);
   }
   ground.relief_share *= std::lerp(spec_.relief_share, 1.0, smooth_step((out_m - half_m) / half_m));

@@ -11,6 +11,7 @@
 
 #include "core/geometry/line_field.h"
 #include "core/random.h"
+#include "terrain/trail/bank_profile.h"
 
 namespace groundray {
 
@@ -67,7 +68,8 @@ struct TrailSpec {
   std::optional<Potholes> potholes{};
   std::optional<Ditches> ditches{};
   std::optional<Roots> roots{};
-  Seed variant{};  ///< selects the variation, and where potholes and roots are
+  std::optional<Benches> benches{};  ///< of the banks
+  Seed variant{};  ///< selects the variation, setbacks of benches, and places of potholes and roots
 };
 
 /// Trail as a function of place: changes the height of the ground near its line. Immutable; any
@@ -120,6 +122,7 @@ class Trail {
   double edge_m(double across_m) const noexcept;
 
   TrailSpec spec_;
+  BankProfile bank_;
   LineField field_;
   std::vector<double> levels_m_;           // by point of the line
   std::vector<double> depths_, shifts_m_;  // of the ruts, likewise; depths relative to their depth

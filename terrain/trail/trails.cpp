@@ -72,6 +72,10 @@ std::uint64_t Trails::fingerprint() const noexcept {
                              roots.height_m,
                              std::bit_cast<double>(spec.variant.value)};
     add(hash_of(std::span<const double>(numbers)));
+    if (const auto& benches = spec.benches) {
+      const std::array sizes_m{benches->height_m, benches->width_m, benches->roughness_m};
+      add(hash_of(std::span<const double>(sizes_m)));
+    }
     add(hash_of(std::span<const double>(trail.levels_m())));
     add(hash_of(std::span<const glm::dvec2>(trail.field().line().points_m)));
   }

@@ -66,6 +66,15 @@ TrailSpec::Roots read_roots(Map map) {
   return roots;
 }
 
+Benches read_benches(Map map) {
+  Benches benches;
+  map.read_number("height_m", Need::Required, benches.height_m, positive);
+  map.read_number("width_m", Need::Required, benches.width_m, positive);
+  map.read_number("roughness_m", Need::Optional, benches.roughness_m, not_negative);
+  map.close();
+  return benches;
+}
+
 TrailSpec read_trail(Map map, Faults& faults) {
   TrailSpec trail;
   map.read_text("name", Need::Required, trail.name);
@@ -98,6 +107,8 @@ TrailSpec read_trail(Map map, Faults& faults) {
   if (auto part = map.map("ditches", Need::Optional))
     trail.ditches = read_ditches(std::move(*part));
   if (auto part = map.map("roots", Need::Optional)) trail.roots = read_roots(std::move(*part));
+  if (auto part = map.map("benches", Need::Optional))
+    trail.benches = read_benches(std::move(*part));
   map.close();
   return trail;
 }

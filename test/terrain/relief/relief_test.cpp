@@ -113,6 +113,7 @@ ReliefSpec with_trails(ReliefSpec spec, double cell_m, const std::vector<glm::dv
   TrailSpec creek = trail;
   creek.name = "creek";
   creek.raised_m = -1.5;
+  creek.benches = {.height_m = 2 * cell_m, .width_m = 3 * cell_m, .roughness_m = cell_m};
   for (glm::dvec2& p_m : creek.waypoints_m)  // mirrored, so that it crosses the track
     p_m.y = waypoints_m.front().y + waypoints_m.back().y - p_m.y;
   spec.trails = {trail, creek};

@@ -98,6 +98,7 @@ TEST(WorldReader, ReadsAScatterLayer) {
     yaw_deg: [0, 90]
     stance: on_slope
     sink_m: 0.1
+    clusters: {size_m: 3}
     clearings:
       - {line_m: [[0, 0], [5, 5]], half_width_m: 2}
       - {polygon_m: [[0, 0], [5, 5], [5, 0]]}
@@ -119,6 +120,8 @@ TEST(WorldReader, ReadsAScatterLayer) {
   EXPECT_EQ(grass.scatter.yaw_deg, (Interval{0, 90}));
   EXPECT_EQ(grass.scatter.stance, Stance::OnSlope);
   EXPECT_EQ(grass.scatter.sink_m, 0.1);
+  EXPECT_EQ(grass.scatter.clusters->size_m, 3);
+  EXPECT_EQ(grass.scatter.clusters->contrast, 1);
   ASSERT_EQ(grass.scatter.clearings.size(), 2u);
   EXPECT_EQ(grass.scatter.clearings[0].shape, Clearing::Shape::Line);
   EXPECT_EQ(grass.scatter.clearings[1].shape, Clearing::Shape::Polygon);
@@ -249,6 +252,11 @@ TEST(WorldReader, ReportsFaultsInLayers) {
            {sound + ", scale: [0, 1]", "must be > 0"},
            {sound + ", stance: leaning", "key 'stance'"},
            {sound + ", sink_m: deep", "key 'sink_m'"},
+           {sound + ", clusters: {contrast: 1}", "key 'size_m': missing"},
+           {sound + ", clusters: {size_m: 0}", "must be > 0"},
+           {sound + ", clusters: {size_m: 2, contrast: 1.5}", "must be from 0 to 1"},
+           {sound + ", rows: {spacing_m: [1, 1]}, clusters: {size_m: 2}",
+            "key 'clusters': have no meaning in 'rows'"},
            {sound + ", clearings: [{half_width_m: 1}]", "'polygon_m'"},
            {sound + ", clearings: [{line_m: [[0, 0]]}]", "key 'half_width_m': missing"},
            {sound + ", clearings: [{line_m: [[0, 0]], half_width_m: -1}]", "must be >= 0"},
@@ -270,7 +278,8 @@ TEST(WorldReader, ReadsTrails) {
   const SceneSpec scene = parse(
       scene_with("  relief: {cell_m: 0.1}\n  trails: [{name: track, waypoints_m: [[0, 0], [9, 0]], "
                  "bank_deg: 45, ruts: {depth_m: 0.1}, ditches: {width_m: 1, depth_m: 0.3, side: "
-                 "left}}]\n  cover: [{material: gravel, trail: {name: track, ruts_m: [0, 0.2], "
+                 "left}, benches: {height_m: 5, width_m: 3, roughness_m: 0.5}}]\n  cover: "
+                 "[{material: gravel, trail: {name: track, ruts_m: [0, 0.2], "
                  "blend_m: 0.1}}]\n",
                  "objects: [{name: car, label: 3, asset: vehicle, drive: {trail: track, from_m: 2, "
                  "speed_m_s: 1, height_m: 0}}]\n"));
@@ -278,6 +287,9 @@ TEST(WorldReader, ReadsTrails) {
   EXPECT_DOUBLE_EQ(trail.bank_slope, 1);
   EXPECT_EQ(trail.ruts->depth_m, 0.1);
   EXPECT_EQ(trail.ditches->side, TrailSpec::Ditches::Side::Left);
+  EXPECT_EQ(trail.benches->height_m, 5);
+  EXPECT_EQ(trail.benches->width_m, 3);
+  EXPECT_EQ(trail.benches->roughness_m, 0.5);
   EXPECT_FALSE(trail.roots);
   const auto& beside = *scene.terrain.cover.at(0).site.trail;
   EXPECT_EQ(beside.name, "track");
@@ -303,6 +315,10 @@ TEST(WorldReader, ReportsFaultsInTrails) {
            {", ditches: {width_m: 1, depth_m: 1, side: east}", "key 'side'"},
            {", washboards: {}", "did you mean 'washboard'?"},
            {", potholes: {per_100_m: 1, diameter_m: 1}", "key 'diameter_m'"},
+           {", benches: {height_m: 2}", "key 'width_m': missing"},
+           {", benches: {height_m: 0, width_m: 1}", "must be > 0"},
+           {", benches: {height_m: 2, width_m: 1, roughness_m: -1}", "must be >= 0"},
+           {", benches: {height_m: 2, width_m: 1, roughness: 1}", "did you mean 'roughness_m'?"},
            {", between_m: [[0, 0], [9, 9]]", "must not be given together with 'waypoints_m'"},
        }) {
     EXPECT_THAT(about_trail(keys), HasSubstr(words)) << keys;
