@@ -9,9 +9,11 @@
 #include <glm/geometric.hpp>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/error.h"
+#include "core/geometry/height_grid.h"
 #include "terrain/trail/trail.h"
 #include "terrain/trail/trails.h"
 #include "test/terrain/trail/straight_trail.h"
