@@ -23,7 +23,7 @@ namespace {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
-using namespace trail_test;
+using namespace trail_test;  // NOLINT(google-build-using-namespace)
 
 constexpr double cell_m = 0.05;
 const auto flat_m = [](glm::dvec2) { return 0.0; };
