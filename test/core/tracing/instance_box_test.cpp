@@ -95,11 +95,12 @@ TEST(InstanceBox, OfAMovingObjectFollowsItsTrajectory) {
   for (int i = 0; i < 50; ++i) {
     const nanoseconds time = milliseconds(when(random));
     const InstanceBox box = boxes.at(1, time);
-    const Pose X = X_DO.pose_at(time);
+    const Pose X_DO_then = X_DO.pose_at(time);
     EXPECT_LT(glm::distance(box.size_m, glm::dvec3(6, 3, 1.5)), rounding_m);
-    EXPECT_LT(glm::distance(box.p_DB, X * (1.5 * glm::dvec3(1, 0, 0.5))), rounding_m);
-    EXPECT_LT(glm::distance(box.R_DB * glm::dvec3(1, 0, 0), X.rotation * glm::dvec3(1, 0, 0)),
-              rounding_m);
+    EXPECT_LT(glm::distance(box.p_DB, X_DO_then * (1.5 * glm::dvec3(1, 0, 0.5))), rounding_m);
+    EXPECT_LT(
+        glm::distance(box.R_DB * glm::dvec3(1, 0, 0), X_DO_then.rotation * glm::dvec3(1, 0, 0)),
+        rounding_m);
     // Between poses the motion is uniform: the difference quotient over 2 us errs by its rounding,
     // 1e-14 m / 2 us, and by the curvature of the turn, (1 rad/s)^2 * 2 m * 1 us.
     constexpr nanoseconds step(1000);
