@@ -143,14 +143,15 @@ double variance_over_a_cell() {
 TEST(Clusters, CountsVaryAsPredicted) {
   constexpr double size_m = 4, per_m2 = 1, side_m = 360, mean = size_m * size_m * per_m2;
   constexpr int cells = 90;
+  constexpr auto all_cells = static_cast<std::size_t>(cells) * cells;
   for (const double contrast : {0.0, 0.6, 1.0}) {
     double sum = 0, squares = 0, count = 0;
     for (std::uint64_t seed = 0; seed < 4; ++seed) {
-      std::vector<double> counts(cells * cells);
+      std::vector<double> counts(all_cells);
       for (const Placement& plant : plants(side_m, per_m2, clustered(size_m, contrast), seed)) {
         const glm::ivec2 cell(glm::floor((glm::dvec2(plant.p_DO) + side_m / 2) / size_m));
         if (std::max(cell.x, cell.y) < cells)
-          ++counts[static_cast<std::size_t>(cell.y * cells + cell.x)];
+          ++counts[static_cast<std::size_t>(cell.y) * cells + static_cast<std::size_t>(cell.x)];
       }
       for (int i = 0; i < cells * cells; ++i) {
         if (i % cells % 3 != 1 || i / cells % 3 != 1) continue;
