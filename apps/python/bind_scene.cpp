@@ -369,6 +369,7 @@ NaN outside of the DEM and in its holes. Objects are ignored.)")
 `seed` replaces the scene's own. `world` is the number of one of the scene's worlds
 (docs/reference/sampling.md), whose values are drawn. Ctrl-C stops the certification of a large DEM.
 Raises groundray.Error, with a line for each fault: file, line, key, rule and likely fix.)");
+  module.def("data_folder", &data_folder, "Returns the folder with groundray's own data.");
   module.def("parse_scene", &parse_given, "text"_a, "path"_a, "seed"_a = nb::none(),
              "terrain"_a = nb::none(), "meshes"_a = std::map<std::string, Mesh>(),
              "trajectories"_a = std::map<std::string, std::string>(),

@@ -1,6 +1,7 @@
 #include "apps/dataset/write/run_text.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <array>
 #include <cmath>
@@ -119,6 +120,14 @@ std::string world_text(const SceneSpec& spec) {
   return fmt::format("world: {}\ndrawn: {}\n", spec.world->number, spec.world->drawn);
 }
 
+std::string classes_text(const SceneSpec& spec) {
+  if (spec.classes.empty()) return "";
+  std::vector<std::string> entries;
+  for (const auto& [label, name] : spec.classes)
+    entries.push_back(fmt::format("{}: {}", label, name));
+  return fmt::format("classes: {{{}}}\n", fmt::join(entries, ", "));
+}
+
 }  // namespace
 
 std::vector<RunInput> run_inputs(const Simulation& simulation) {
@@ -144,15 +153,15 @@ std::vector<RunInput> run_inputs(const Simulation& simulation) {
 std::string run_header(const Simulation& simulation, const FrameChoice& choice) {
   const glm::dvec3 origin_m = simulation.terrain.header().origin_w_m;
   std::string text = fmt::format(
-      "groundray_dataset: 1\nversion: {}\nseed: {}\n{}tracing: {}\nfunctions: \"{:016x}\"\n"
+      "groundray_dataset: 1\nversion: {}\nseed: {}\n{}tracing: {}\n{}functions: \"{:016x}\"\n"
       "inputs: \"{:016x}\"\ntime_origin_s: {}\n"
       "origin_w_m: [{}, {}, {}]\ncrs: "
       "{}\ncrs_wkt: {}\nscene: "
       "{}\nsensors:\n",
       yaml_text(GROUNDRAY_VERSION), simulation.spec.seed.value, world_text(simulation.spec),
-      simulation.spec.tracing == Tracing::Fast ? "fast" : "exact", math::fingerprint(),
-      fingerprint(simulation), seconds_text(simulation.begin), origin_m.x, origin_m.y, origin_m.z,
-      yaml_text(simulation.terrain.header().crs_name),
+      simulation.spec.tracing == Tracing::Fast ? "fast" : "exact", classes_text(simulation.spec),
+      math::fingerprint(), fingerprint(simulation), seconds_text(simulation.begin), origin_m.x,
+      origin_m.y, origin_m.z, yaml_text(simulation.terrain.header().crs_name),
       yaml_text(simulation.terrain.header().crs_wkt), yaml_text(simulation.spec.text));
   std::size_t number = 0;
   const auto add_sensor = [&](const auto& spec, const char* kind, const std::string& model,

@@ -193,6 +193,14 @@ class _Map:
             raise self.fault(key, f"= {seconds} {_OF_TIMES}")
         return seconds
 
+    def classes(self) -> dict[int, str]:
+        """Returns the classes by label at `classes`; none if there is no such key."""
+        classes = self.values.get("classes", {})
+        texts = isinstance(classes, dict) and all(isinstance(k, str) for k in classes.values())
+        if not texts or not all(label.isdecimal() for label in classes):
+            raise self.fault("classes", "must be a map of labels to classes")
+        return {int(label): name for label, name in classes.items()}
+
     def maps(self, key: str, *, is_optional: bool = False) -> list[_Map]:
         value = self.values.get(key, []) if is_optional else self.get(key)
         if not isinstance(value, list):
@@ -332,6 +340,7 @@ class Dataset:
         frames = self._read_frames(root)
         for sensor in root.maps("sensors"):
             self._read_sensor(sensor, frames)
+        self.classes = root.classes()
         self.object_groups = [
             ObjectGroup(
                 each.text("name"),

@@ -15,7 +15,8 @@ from pathlib import Path
 from types import FrameType
 
 from groundray.dataset import Camera, Dataset, Error, Lidar
-from groundray.export import clouds, denoised, kitti, las, ros_bag, tum
+from groundray.export import clouds, denoised, kitti, label_images, las, ros_bag, tum
+from groundray.export.label_sets import LabelSet, find_set
 from groundray.export.labels import LabelMap
 from groundray.export.notes import Notes, tell_of_columns, tell_of_products
 from groundray.export.scan import FullScale
@@ -23,16 +24,27 @@ from groundray.shell_text import add_text_options
 
 DONE, FAILED, INTERRUPTED = 0, 1, 130  # argparse exits with 2 on wrong usage
 
-_FORMS = ("kitti", "semantic-kitti", "tum", "pcd", "las", "laz", "npz", "mcap", "denoised")
+_FORMS = (
+    "kitti",
+    "semantic-kitti",
+    "tum",
+    "pcd",
+    "las",
+    "laz",
+    "npz",
+    "mcap",
+    "denoised",
+    "labels",
+)
 _KITTI, _LAS = {"kitti", "semantic-kitti"}, {"las", "laz"}
 # Formats that an option applies to; options not listed apply to all.
 _ONLY_OF = {
     "lidar": set(_FORMS) - {"tum", "denoised"},
-    "camera": _KITTI | {"tum", "mcap", "denoised"},
+    "camera": _KITTI | {"tum", "mcap", "denoised", "labels"},
     "no_images": _KITTI | {"mcap"},
     "intensity_full_scale": _KITTI | _LAS | {"mcap"},
     "sequence": _KITTI,
-    "labels": {"semantic-kitti"} | _LAS,
+    "labels": {"semantic-kitti", "labels"} | _LAS,
     "depth_per_m": {"tum"},
     "columns": {"pcd"},
     "frame": {"pcd"},
@@ -56,6 +68,7 @@ _PACKAGES = {
         "OpenEXR": "openexr",
     },
     "denoised": {"pyoidn": "pyoidn", "OpenEXR": "openexr"},
+    "labels": {"cv2": "opencv-python-headless", "OpenEXR": "openexr"},
 }
 
 
@@ -101,8 +114,8 @@ def _add_points(group: argparse._ArgumentGroup) -> None:
     add = group.add_argument
     text = "intensity that becomes 1, 255 or 65535 in formats with such a scale"
     add("--intensity-full-scale", type=_positive, metavar="I", help=text)
-    text = "map of labels to other numbers (semantic-kitti, las, laz)"
-    add("--labels", type=Path, metavar="MAP.yaml", help=text)
+    text = "set of labels, such as rellis_3d, or a map of labels (semantic-kitti, las, laz, labels)"
+    add("--labels", metavar="SET|MAP.yaml", help=text)
     add("--columns", metavar="A,B,...", help="columns of a PCD file (default: all)")
     text = "frame of x, y, z in a PCD file (default: fired)"
     add("--frame", choices=("fired", "stamp", "world"), help=text)
@@ -171,23 +184,47 @@ def _chosen(dataset: Dataset, kind: str, names: Sequence[str] | None) -> list[Li
     return [sensor for sensor in sensors if sensor.name in names]  # type: ignore[return-value]
 
 
+def _set_of(options: argparse.Namespace) -> LabelSet | None:
+    """Returns the set of labels that --labels names; None if it names a file, or nothing."""
+    given: str = options.labels or ".yaml"
+    return None if given.endswith((".yaml", ".yml")) else find_set(given)
+
+
+def _labels(options: argparse.Namespace, most: int, dataset: Dataset, notes: Notes) -> LabelMap:
+    """Returns the map of labels that --labels names, by a set or a file; else that of none."""
+    chosen = _set_of(options)
+    if chosen is None:
+        return LabelMap(Path(options.labels) if options.labels else None, most)
+    near = sorted(chosen.nearest & set(dataset.classes.values()))
+    if near:
+        notes.tell(f"{chosen.name} has no class of its own for {', '.join(near)}: see labels.md")
+    return LabelMap.of_set(chosen, dataset, most)
+
+
 def _export(options: argparse.Namespace, out: Path, dataset: Dataset, notes: Notes) -> str:
     lidars: list[Lidar] = _chosen(dataset, "lidar", options.lidar)  # type: ignore[assignment]
     cameras: list[Camera] = _chosen(dataset, "camera", options.camera)  # type: ignore[assignment]
     if options.no_images:
         cameras = []
-    if not lidars and options.to not in ("tum", "mcap", "denoised"):
+    if not lidars and options.to not in ("tum", "mcap", "denoised", "labels"):
         raise Error(f"{dataset.folder}: it has no lidar, but {options.to} needs scans")
     full_scale = FullScale(options.intensity_full_scale)
     if lidars:
         tell_of_columns(options.to, options.points or "full", notes)
     tell_of_products(dataset, options.to, lidars, cameras, notes)
     if options.to in _KITTI:
-        labels = LabelMap(options.labels, 65535) if options.to == "semantic-kitti" else None
+        wanted = options.to == "semantic-kitti"
+        labels = _labels(options, 65535, dataset, notes) if wanted else None
         settings = kitti.KittiOptions(options.sequence or 0, full_scale, labels)
         return kitti.write_kitti(dataset, lidars, cameras, settings, out, notes)
     if options.to == "tum":
         return tum.write_tum(dataset, cameras, options.depth_per_m or 5000, out, notes)
+    if options.to == "labels":
+        chosen = _set_of(options)
+        if chosen is None:
+            raise Error("--to labels needs --labels with the name of a set, such as rellis_3d")
+        map_ = _labels(options, 65535, dataset, notes)
+        return label_images.write_labels(dataset, lidars, cameras, chosen, map_, out, notes)
     if options.to == "denoised":
         return denoised.write_denoised(dataset, cameras, out, notes)
     if options.to == "pcd":
@@ -196,7 +233,7 @@ def _export(options: argparse.Namespace, out: Path, dataset: Dataset, notes: Not
     if options.to == "npz":
         return clouds.write_npz(dataset, lidars, out)
     if options.to in _LAS:
-        labels = LabelMap(options.labels, 255) if options.labels else None
+        labels = _labels(options, 255, dataset, notes) if options.labels else None
         place, clock = options.place or "measured", options.clock or "run"
         form = las.LasOptions(options.to, bool(options.merge), place, clock, full_scale, labels)
         return las.write_las(dataset, lidars, form, out, notes)

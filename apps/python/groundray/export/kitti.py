@@ -167,8 +167,10 @@ class _Sequence:
         times = [f"{(each.time_ns - begin_ns) * 1e-9:.9f}\n" for each in self.frames]
         (folder / "times.txt").write_text("".join(times))
         self._write_poses(path, folder)
-        map_ = self.options.labels
-        labels = _LabelWriter(self.dataset, map_, folder) if map_ else None
+        labels = None
+        if self.options.labels:
+            (folder / "labels").mkdir()
+            labels = LabelWriter(self.dataset, self.options.labels, folder / "labels")
         for i, each in enumerate(self.frames):
             scan = read_scan(self.dataset, self.lidar, each.scan)
             self._write_points(scan, path, each.time_ns, folder / f"velodyne/{i:06}.bin")
@@ -179,7 +181,7 @@ class _Sequence:
             if each.image is not None:
                 self._write_pictures(each.image, folder, f"{i:06}.png")
         if labels:
-            labels.finish(self.notes)
+            labels.finish(folder / "instances.txt", self.notes)
 
     def _write_poses(self, path: SensorPath, folder: Path) -> None:
         """Writes the poses of camera 0 relative to the first."""
@@ -227,23 +229,23 @@ def _numbers(matrix: Floats) -> str:
     return " ".join(f"{value:.16e}" for value in matrix.ravel())
 
 
-class _LabelWriter:
-    """labels/*.label: the class in the lower 16 bits, the instance in the upper 16."""
+class LabelWriter:
+    """Files *.label: the class in the lower 16 bits, the instance in the upper 16."""
 
     def __init__(self, dataset: Dataset, labels: LabelMap, folder: Path) -> None:
+        """Writes into `folder`, which exists."""
         self._folder = folder
         self._labels = labels
         self._instances = Instances(dataset, labels)
-        (folder / "labels").mkdir()
 
     def write(self, scan: Scan, i: int) -> None:
         theirs = self._labels.of(scan.rows["label"])
         instances = self._instances.of(scan.rows, theirs)
         values = (instances << np.uint32(16) | theirs).astype("<u4")
-        (self._folder / f"labels/{i:06}.label").write_bytes(values.tobytes())
+        (self._folder / f"{i:06}.label").write_bytes(values.tobytes())
 
-    def finish(self, notes: Notes) -> None:
-        """Writes the dataset's number of each instance if they were renumbered."""
+    def finish(self, file: Path, notes: Notes) -> None:
+        """Writes the dataset's number of each instance to a file if they were renumbered."""
         if self._labels.file is None:
             notes.tell(
                 "labels are the dataset's own numbers, not SemanticKITTI's; --labels replaces them"
@@ -251,11 +253,11 @@ class _LabelWriter:
         if not self._instances.is_renumbered:
             return
         notes.tell(
-            "instances are renumbered per label to fit 16 bits: instances.txt lists the originals"
+            f"instances are renumbered per label to fit 16 bits: {file.name} lists the originals"
         )
         lines = [
             f"{label} {number} {instance}\n"
             for (label, instance), number in self._instances.numbers.items()
         ]
         header = "# label, its instance here, the dataset's instance\n"
-        (self._folder / "instances.txt").write_text(header + "".join(lines))
+        file.write_text(header + "".join(lines))

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundray.dataset import Dataset, Error, read_yaml
+from groundray.export.label_sets import LabelSet
 
 Numbers = NDArray[np.uint32]
 
@@ -16,10 +17,15 @@ Numbers = NDArray[np.uint32]
 class LabelMap:
     """Map of the dataset's labels to others, from a file of `labels`, `others` and `instances`."""
 
-    def __init__(self, file: Path | None, most: int) -> None:
-        """Keeps all labels if there is no file. Raises Error if the file is invalid."""
+    def __init__(self, file: Path | None, most: int, nothing: int = 0) -> None:
+        """Keeps all labels if there is no file. Raises Error if the file is invalid.
+
+        nothing: number of what has no label.
+        """
         self.file = file
         self.most = most
+        self.nothing = nothing
+        self._places = "labels, or set others"
         self.labels: dict[int, int] = {}
         self.others: int | None = None
         self.with_instances: set[int] | None = None
@@ -50,6 +56,27 @@ class LabelMap:
             raise Error(f"{self.file}: {number!r} must be a whole number from 0 to {most}")
         return number
 
+    @classmethod
+    def of_set(cls, of: LabelSet, dataset: Dataset, most: int) -> LabelMap:
+        """Maps the dataset's labels by their classes.
+
+        Raises Error if it states no classes, or the set lacks one of them.
+        """
+        record = dataset.folder / "dataset.yaml"
+        if not dataset.classes:
+            fix = "add `classes: {1: ground, ...}` to the scene, or map labels by a file"
+            raise Error(f"{record}: it states no classes, which the set {of.name} needs; {fix}")
+        map_ = cls(None, most, of.nothing)
+        map_.file = record
+        map_._places = "the scene's classes"
+        for label, name in dataset.classes.items():
+            if name not in of.of:
+                has = ", ".join(of.of)
+                rule = f"the set {of.name} has no number for the class {name} of label {label}"
+                raise Error(f"{of.file}: {rule}; it has {has}; map labels by a file instead")
+            map_.labels[label] = map_._checked(of.of[name], most)
+        return map_
+
     def of(self, labels: NDArray[Any]) -> Numbers:
         """Returns the mapped labels. Raises Error for a label without a number."""
         ours, which = np.unique(labels, return_inverse=True)
@@ -63,9 +90,9 @@ class LabelMap:
             if self.others is not None:
                 return self.others
             if label == 0:
-                return 0  # unlabelled stays unlabelled
+                return self.nothing
             rule = f"it has no number for the label {label}"
-            raise Error(f"{self.file}: {rule}; add it to labels, or set others")
+            raise Error(f"{self.file}: {rule}; add it to {self._places}")
         if label > self.most:
             rule = f"label {label} is above {self.most}, the limit of this format"
             raise Error(f"{rule}; map it to another number with --labels")
