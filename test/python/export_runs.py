@@ -59,7 +59,7 @@ products: [truth]
 SCENE = f"""\
 groundray: 1
 seed: 5
-classes: {10: vehicle, 40: ground, 70: rock, 72: grass}
+classes: {{10: vehicle, 40: ground, 70: rock, 72: grass}}
 duration_s: 0.3
 terrain:
   dem: {ROOT / "data/terrain/prairie_1m.tif"}

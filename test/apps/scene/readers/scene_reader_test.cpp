@@ -4,11 +4,14 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdint>
 #include <fstream>
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
 #include <glm/trigonometric.hpp>
+#include <map>
 #include <numbers>
+#include <string>
 
 #include "core/error.h"
 #include "sensors/sky/sun.h"
@@ -640,6 +643,32 @@ TEST(PresetNames, AreOfTheRequestedKind) {
   EXPECT_THAT(lidars, Not(::testing::Contains("tum_vi_cam1")));
   EXPECT_THAT(cameras, ::testing::Contains("tum_vi_cam1"));
   EXPECT_EQ(lidars.size() + cameras.size(), preset_names(folder).size());
+}
+
+TEST(SceneReader, ReadsTheClassesOfLabels) {
+  const auto classes = parse(with(scene_text, "duration_s",
+                                  "classes: {40: ground, 0: object, 65535: fence_post}\n"
+                                  "duration_s"))
+                           .classes;
+  EXPECT_EQ(classes, (std::map<std::uint16_t, std::string>{
+                         {0, "object"}, {40, "ground"}, {65535, "fence_post"}}));
+  EXPECT_TRUE(parse(scene_text).classes.empty());
+}
+
+TEST(SceneReader, RejectsClassesThatDoNotExistAndKeysThatAreNoLabels) {
+  const auto about = [](const std::string& classes) {
+    return complaint("duration_s", "classes: " + classes + "\nduration_s");
+  };
+  EXPECT_THAT(
+      about("{1: grownd}"),
+      HasSubstr("prairie.yaml:3:14: key 'classes': 1 is 'grownd', but must be one of ground, "
+                "grass, "));
+  EXPECT_THAT(about("{1: grownd}"), HasSubstr("did you mean 'ground'?"));
+  EXPECT_THAT(about("{tree: 1}"), HasSubstr("'tree' must be a label, a whole number from 0 to"));
+  EXPECT_THAT(about("{65536: tree}"), HasSubstr("'65536' must be a label"));
+  EXPECT_THAT(about("{-1: tree}"), HasSubstr("'-1' must be a label"));
+  EXPECT_THAT(about("[tree]"), HasSubstr("is a list of 1, but must be a map"));
+  EXPECT_THAT(about("{1: tree, 1: grass}"), HasSubstr("repeated; first given in line 3"));
 }
 
 }  // namespace
