@@ -83,6 +83,7 @@ def test_the_package_passes_mypy(tmp_path):
         "lazrs",
         "mcap",
         "mcap_ros2",
+        "pyarrow",
         "pyoidn",
         "pyproj",
         "rosbags",
