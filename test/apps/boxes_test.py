@@ -153,7 +153,7 @@ def test_velocities_are_differences_of_positions(dataset):
     assert speed(tracks["car"][0][2]) == pytest.approx(8, rel=0.1)
 
 
-def test_bytes_do_not_depend_on_threads_and_shards(dataset, tmp_path):
+def test_boxes_do_not_depend_on_threads_and_shards(dataset, tmp_path):
     assert files(run(tmp_path, "--threads", "1")) == files(dataset)
     shards = [run(tmp_path, "--shard", f"{k}/2", out=f"shard{k}") for k in (1, 2)]
     result = groundray("merge", *shards, "-o", tmp_path / "joined")

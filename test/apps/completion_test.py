@@ -21,7 +21,7 @@ PROGRAMS = [
 ]
 COMMANDS = {
     "groundray": [
-        *("generate", "verify", "merge", "info", "list", "terrain", "reconstruct"),
+        *("generate", "sample", "verify", "merge", "info", "list", "terrain", "reconstruct"),
         *(f"terrain {what}" for what in ("mesh", "certify", "fill")),
         *(f"reconstruct {what}" for what in ("mesh", "simplify", "fill", "dem")),
     ],
@@ -75,7 +75,7 @@ printf '%s\\n' "${{COMPREPLY[@]}}"
     [
         (
             "groundray ",
-            {"generate", "verify", "merge", "info", "list", "terrain", "reconstruct"},
+            {"generate", "sample", "verify", "merge", "info", "list", "terrain", "reconstruct"},
         ),
         ("groundray ge", {"generate"}),
         ("groundray terrain ", {"mesh", "certify", "fill"}),

@@ -89,7 +89,7 @@ def test_output_to_a_file_or_into_the_dataset_is_rejected(run, capsys):
         (["--to", "rosbag"], "invalid choice: 'rosbag'"),
         (["--to", "npz", "--merge"], "--merge applies to las, laz, not to npz"),
         (["--to", "tum", "--lidar", "top"], "--lidar applies to"),
-        (["--to", "kitti", "--labels", "map.yaml"], "--labels applies to las, laz, semantic-kitti"),
+        (["--to", "kitti", "--labels", "map.yaml"], "--labels applies to labels, las, laz"),
         (["--to", "tum", "--depth-per-m", "0"], "0 must be above 0"),
         (["--to", "kitti", "--sequence", "100"], "100 must be from 0 to 99"),
         (["--to", "mcap", "--shift-s", "1e10"], "must be within 2^31 s"),

@@ -253,7 +253,7 @@ MISTAKES = [
         "a mistake in a scene of dicts",
         "groundray.scene({**spec, 'frobnicate': 8}, folder='.', terrain=terrain)",
         groundray.Error,
-        ["scene:65:1: key 'frobnicate': unknown; the keys here are cameras, duration_s"],
+        ["scene:65:1: key 'frobnicate': unknown; the keys here are cameras, classes, duration_s"],
     ),
     (
         "a mesh in an unknown format",

@@ -312,7 +312,7 @@ TEST(CameraFile, ReportsFaultsInLists) {
   EXPECT_THAT(
       complaint("[raw, picture", "[raw, pictrue"),
       HasSubstr("key 'products': has 'pictrue', but may have radiance, truth, bound, "
-                "flow, flow_flo, flow_kitti, coverage, irradiance, photons, electrons, raw, "
+                "flow, flow_flo, flow_kitti, boxes, coverage, irradiance, photons, electrons, raw, "
                 "picture; did you mean 'picture'?"));
   EXPECT_THAT(complaint("[raw, picture", "[raw, raw"), HasSubstr("has 'raw' twice"));
   EXPECT_THAT(complaint("[raw, picture, truth, flow_kitti]", "[]"), HasSubstr("an empty list"));
