@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -10,7 +9,6 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <variant>
 #include <vector>
 
@@ -179,17 +177,11 @@ struct DrawnWorld {
   std::string drawn;  ///< keys and values: a map of YAML in one line
 };
 
-/// Classes of surfaces that a scene file can name, from which the numbers of other datasets follow
-/// (docs/reference/labels.md).
-inline constexpr std::array<std::string_view, 17> surface_classes{
-    "ground", "grass", "shrub",  "rock",   "tree",    "vehicle", "person", "animal", "fence_post",
-    "mud",    "water", "puddle", "gravel", "asphalt", "log",     "sign",   "object"};
-
 /// Content of a scene file.
 struct SceneSpec {
   std::string text;  ///< text of the file, or of a world of it
   std::optional<DrawnWorld> world;
-  std::map<std::uint16_t, std::string> classes;  ///< by label: one of surface_classes
+  std::map<std::uint16_t, std::string> classes;  ///< by label (docs/reference/labels.md)
   std::uint32_t worlds = 0;  ///< number of worlds of the file, if none of them is chosen
   Seed seed;
   Tracing tracing = Tracing::Fast;

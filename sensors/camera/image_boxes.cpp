@@ -169,6 +169,28 @@ bool surrounds(const InstanceBox& box, const glm::dvec3& p_D) noexcept {
   return glm::all(glm::lessThanEqual(glm::abs(p_B), 0.5 * box.size_m + 1e-3));
 }
 
+// Returns a rectangle that contains the images of an instance's box at the times of all rows;
+// nullopt if the lens does not image all of it, or the box surrounds the camera.
+std::optional<PixelBox> where_shown(const Camera& camera, const InstanceBoxes& boxes,
+                                    const Trajectory& X_DC, nanoseconds begin,
+                                    std::uint32_t instance, const Shown& shown) {
+  constexpr int times = 5;  // between these, the box moves nearly uniformly in the image
+  const double last_row = camera.spec().size_px.y - 1;
+  PixelBox region = shown.box;
+  for (int i = 0; i < times; ++i) {
+    const nanoseconds time = begin + camera.middle_of(last_row * i / (times - 1));
+    const InstanceBox box = boxes.at(instance, time);
+    const Pose X_DC_then = X_DC.pose_at(time);
+    if (surrounds(box, X_DC_then.translation_m)) return std::nullopt;
+    const auto faces = projected(box, camera, X_DC_then);
+    if (!faces) return std::nullopt;
+    region.add(faces->low);
+    region.add(faces->high);
+    if (camera.middle_of(last_row) == camera.middle_of(0)) break;  // a global shutter
+  }
+  return region;
+}
+
 // Measures one instance.
 ImagedInstance imaged(const Camera& camera, const Scene& scene, const InstanceBoxes& boxes,
                       const Trajectory& X_DC, nanoseconds begin, std::uint32_t instance,
@@ -177,27 +199,18 @@ ImagedInstance imaged(const Camera& camera, const Scene& scene, const InstanceBo
   const PixelBox image{{0, 0}, size - 1};
   const PixelBox around{-size / 2, size + size / 2 - 1};
   const double row = static_cast<double>(shown.sum_of_rows) / shown.pixels;
-  const nanoseconds time = begin + camera.middle_of(row);
   ImagedInstance measured;
-  measured.box = boxes.at(instance, time);
+  measured.box = boxes.at(instance, begin + camera.middle_of(row));
   measured.pixels = shown.pixels;
   measured.visible = shown.box;
-  const Pose X_DC_then = X_DC.pose_at(time);
-  std::optional<PixelBox> region;
-  if (!surrounds(measured.box, X_DC_then.translation_m))
-    region = projected(measured.box, camera, X_DC_then);
-  PixelBox searched = around;
-  if (region) {
-    region->add(shown.box.low);
-    region->add(shown.box.high);
-    searched = intersection(widened(*region, 2), around);
-  }
+  const auto region = where_shown(camera, boxes, X_DC, begin, instance, shown);
+  const PixelBox searched = region ? intersection(widened(*region, 2), around) : around;
   Silhouette silhouette(camera, X_DC, begin, scene.objects.only(instance));
   for (PixelBox inside = intersection(searched, image);;) {
     measured.alone = 0;
     measured.whole = {};
     silhouette.add_inside(inside, measured);
-    // A rolling shutter, or a lens that bends faces, may show more than the box's faces.
+    // A lens that bends faces may show more than the lattice on them.
     const PixelBox due = intersection(widened(measured.whole, 1), image);
     if (measured.alone == 0 || (contains(inside, due.low) && contains(inside, due.high))) break;
     inside = intersection(widened(inside, std::max(8, (inside.high.x - inside.low.x) / 4)), image);

@@ -36,8 +36,8 @@ def test_a_set_is_consistent(name):
         assert all(0 <= value <= 255 for value in each["colour"])
     assert set(said["of"].values()) | {said["nothing"]} <= set(numbers)
     assert set(said["nearest"]) <= set(said["of"])
-    header = (ROOT / "apps/scene/scene_spec.h").read_text()
-    known = re.search(r"surface_classes\{(.*?)\};", header, re.DOTALL)
+    header = (ROOT / "apps/scene/readers/class_reader.cpp").read_text()
+    known = re.search(r"classes_of_surfaces\{(.*?)\};", header, re.DOTALL)
     assert set(said["of"]) <= set(re.findall(r'"(\w+)"', known[1]))
 
 

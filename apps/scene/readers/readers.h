@@ -1,7 +1,9 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <glm/vec2.hpp>
+#include <map>
 #include <optional>
 #include <set>
 #include <span>
@@ -33,6 +35,9 @@ fs::path beside(const fs::path& file, const std::string& relative);
 /// Reads the name of a file that is relative to the folder of `path`.
 const Node* read_path(Map& map, std::string_view key, Need need, const fs::path& path,
                       fs::path& into);
+
+/// Reads the classes that labels stand for.
+std::map<std::uint16_t, std::string> read_classes(Map& root, Faults& faults);
 
 /// Reads a list of pairs; leaves out those that are invalid, and records them.
 std::vector<glm::dvec2> read_points(std::span<const Node> pairs, std::string_view key,

@@ -1,12 +1,7 @@
 #include "apps/scene/readers/scene_reader.h"
 
-#include <fmt/ranges.h>
-
 #include <algorithm>
-#include <charconv>
 #include <cmath>
-#include <cstddef>
-#include <map>
 #include <span>
 #include <string_view>
 #include <system_error>
@@ -18,7 +13,6 @@
 #include "apps/scene/yaml_writer.h"
 #include "core/appearance/bsdf.h"
 #include "core/folder_names.h"
-#include "core/near_names.h"
 #include "sensors/lidar/lidar.h"
 
 namespace groundray::yaml {
@@ -208,34 +202,6 @@ std::optional<DrawnWorld> read_drawn(Map& root) {
   return drawn;
 }
 
-// Reads the classes that labels stand for.
-std::map<std::uint16_t, std::string> read_classes(Map& root, Faults& faults) {
-  const Node* const node = root.find("classes", Need::Optional);
-  if (!node) return {};
-  const std::vector<std::string> known(surface_classes.begin(), surface_classes.end());
-  std::map<std::uint16_t, std::string> classes;
-  Map map(*node, "classes", faults);
-  for (std::size_t i = 0; node->kind == Node::Kind::Map && i + 1 < node->items.size(); i += 2) {
-    const std::string& key = node->items[i].text;
-    std::uint16_t label = 0;
-    const auto [end, fault] = std::from_chars(key.data(), key.data() + key.size(), label);
-    if (fault != std::errc{} || end != key.data() + key.size()) {
-      faults.add(node->items[i], "classes", "'{}' must be a label, a whole number from 0 to 65535",
-                 key);
-      continue;
-    }
-    std::string word;
-    const Node* const at = map.read_text(key, Need::Required, word);
-    if (at && std::ranges::find(known, word) == known.end()) {
-      faults.add(*at, "classes", "{} is '{}', but must be one of {}{}", label, word,
-                 fmt::join(known, ", "), suggestion(word, known));
-    } else if (at) {
-      classes[label] = word;
-    }
-  }
-  return classes;
-}
-
 // Reads all of a scene but its text and its block `worlds`.
 SceneSpec read_scene(const Node& node, const fs::path& path, const fs::path& preset_folder,
                      Faults faults) {
@@ -243,7 +209,7 @@ SceneSpec read_scene(const Node& node, const fs::path& path, const fs::path& pre
   Map root(node, "", faults);
   root.find("worlds", Need::Optional);
   scene.world = read_drawn(root);
-  scene.classes = read_classes(root, faults);
+  scene.classes = yaml::read_classes(root, faults);
   const yaml::DataFolders folders{preset_folder};
   yaml::check_version(root, "groundray", faults);
   root.read_whole("seed", Need::Required, scene.seed.value);

@@ -18,7 +18,7 @@ from groundray.export.labels import LabelMap, Numbers
 from groundray.export.notes import Notes
 from groundray.export.scan import read_scan
 
-_BACKGROUND = 255  # largest number that a PNG of 8 bits holds
+_MOST_OF_8_BITS = 255  # largest number that a PNG of 8 bits holds
 
 
 def write_labels(
@@ -99,7 +99,7 @@ class _Images:
     def _write_frame(self, frame: Frame, name: str) -> list[dict[str, Any]]:
         labels, instances = self._read(frame)
         numbers = self._map.of(labels.ravel()).reshape(labels.shape)
-        deep = np.uint8 if max(self._of.names) <= _BACKGROUND else np.uint16
+        deep = np.uint8 if max(self._of.names) <= _MOST_OF_8_BITS else np.uint16
         self._png(f"{name}_label.png", numbers.astype(deep))
         self._png(f"{name}_colour.png", self._palette[numbers])
         keys = numbers.astype(np.uint64) << np.uint64(32) | instances
