@@ -13,7 +13,7 @@ namespace groundray {
 
 /// Options of a run.
 struct GenerateOptions {
-  std::optional<Seed> seed;  ///< replaces the scene's own, for other noise and scattering
+  std::optional<Seed> seed;            ///< replaces the scene's own, for other noise and scattering
   std::optional<std::uint32_t> world;  ///< one of the scene's worlds (docs/reference/sampling.md)
   FolderUse use = FolderUse::New;
   RunPart part;     ///< shard, or chosen sensors and frames; all by default

@@ -61,9 +61,9 @@ struct MadeImage {
   std::optional<Exposure> light;
   std::optional<ImageTruth> truth;
   std::vector<ImagedInstance> instances;  ///< if the camera's products include boxes
-  std::vector<std::uint16_t> labels;  ///< labels of the channels of the light's coverage
-  std::uint64_t paths = 0;            ///< number of light paths traced
-  ExposureSetting exposure;           ///< exposure time and gain of the light
+  std::vector<std::uint16_t> labels;      ///< labels of the channels of the light's coverage
+  std::uint64_t paths = 0;                ///< number of light paths traced
+  ExposureSetting exposure;               ///< exposure time and gain of the light
 };
 
 /// Returns the exposure time and gain of an image: those of its light, if they are automatic.
