@@ -1,12 +1,18 @@
-"""Runs clang-tidy on every source whose current state has not passed before.
+"""Runs clang-tidy on every group of sources whose current state has not passed before.
 
     clang_tidy.py BUILD CLANG_TIDY SOURCE...
 
-BUILD holds compile_commands.json. A source that passes leaves a stamp in
-$XDG_CACHE_HOME/groundray/clang-tidy (~/.cache/groundray/clang-tidy). The name of a stamp is a hash
-of all inputs of the result: the texts of the source and of the headers of this tree that it
-includes, directly or not; its compile command; clang-tidy's version and settings; the versions of
-installed headers. Paths are relative to the root of the tree, so all clones share their stamps.
+BUILD holds compile_commands.json. Up to 8 sources of a folder with the same flags are a group: a
+file that includes them is read as one, which parses common headers once and takes FIGURE of the
+time. If a group has a finding or does not compile, its sources are read one by one, and their
+findings count. Missing includes may stay hidden in a group; the preset dev compiles each source by
+itself.
+
+A group that passes leaves a stamp in $XDG_CACHE_HOME/groundray/clang-tidy
+(~/.cache/groundray/clang-tidy). The name of a stamp is a hash of all inputs of the result: the
+texts of the sources and of the headers of this tree that they include, directly or not; the
+compile commands; clang-tidy's version and settings; the versions of installed headers. Paths are
+relative to the root of the tree, so all clones share their stamps.
 
 Neither PyPI nor Debian has a cache of clang-tidy's results, and ccache stores none.
 Includes are parsed, not preprocessed: they are paths from the root. This takes half a second for
@@ -20,6 +26,7 @@ import hashlib
 import json
 import os
 import re
+import shlex
 import subprocess
 import sys
 import time
@@ -27,6 +34,7 @@ from pathlib import Path
 
 INCLUDE = re.compile(r'^ *# *include *(["<])([^">]+)[">]', re.MULTILINE)
 FOLDERS = ("", "data")  # search path of includes
+MOST_IN_GROUP = 8
 KEPT_DAYS = 90  # stamps unused for this long are deleted
 
 
@@ -54,10 +62,10 @@ class SourceTree:
                 sys.exit(f'{path}: #include "{name}" is not a file of this tree')
         return tuple(found)
 
-    def dependencies(self, path: str) -> list[str]:
-        """Returns a source and the headers of the tree that it includes, directly or not."""
-        known = {path}
-        open_ends = [path]
+    def dependencies(self, paths: list[str]) -> list[str]:
+        """Returns sources and the headers of the tree that they include, directly or not."""
+        known = set(paths)
+        open_ends = [*paths]
         while open_ends:
             for name in self.included(open_ends.pop()):
                 if name not in known:
@@ -65,10 +73,10 @@ class SourceTree:
                     open_ends.append(name)
         return sorted(known)
 
-    def stamp(self, path: str, settings: str) -> str:
-        """Returns the hash of a source with its headers and settings."""
-        digest = hashlib.sha256(settings.encode())
-        for name in self.dependencies(path):
+    def stamp(self, paths: list[str], settings: str) -> str:
+        """Returns the hash of sources with their headers and settings."""
+        digest = hashlib.sha256("\0".join([settings, *paths]).encode())
+        for name in self.dependencies(paths):
             digest.update(f"\0{name}\0{len(self.text(name))}\0".encode())
             digest.update(self.text(name))
         return digest.hexdigest()
@@ -95,15 +103,62 @@ def commands(build: Path, root: Path) -> dict[str, str]:
     }
 
 
-def passes(clang_tidy: str, build: str, path: str) -> bool:
-    done = subprocess.run(
-        [clang_tidy, "-p", build, "--quiet", path], capture_output=True, text=True, check=False
-    )
-    if done.returncode != 0:
-        noise = re.compile(r"^\d+ warnings?( and \d+ errors?)? generated")
-        said = [line for line in done.stderr.splitlines() if not noise.match(line)]
-        print(done.stdout, *said, sep="\n", flush=True)
-    return done.returncode == 0
+def flags_of(command: str, path: str) -> list[str]:
+    """Returns the flags of a compile command: without compiler, source and object."""
+    words = shlex.split(command)[1:]
+    kept = []
+    for word in words:
+        if kept and kept[-1] == "-o":
+            kept.pop()
+        elif word != "-c" and not word.endswith(path):
+            kept.append(word)
+    return kept
+
+
+def groups_of(sources: list[str], flags: dict[str, list[str]]) -> list[list[str]]:
+    """Returns the sources in groups of one folder, with equal flags; those of no target singly."""
+    alike: dict[tuple[str, ...], list[str]] = {}
+    for path in sources:
+        key = (os.path.dirname(path), *flags[path]) if path in flags else (path,)
+        alike.setdefault(key, []).append(path)
+    return [
+        paths[i : i + MOST_IN_GROUP]
+        for paths in alike.values()
+        for i in range(0, len(paths), MOST_IN_GROUP)
+    ]
+
+
+def findings(*command: str) -> str | None:
+    """Returns what clang-tidy finds, or None if it passes."""
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    noise = re.compile(r"^\d+ warnings?( and \d+ errors?)? generated")
+    said = [line for line in done.stderr.splitlines() if not noise.match(line)]
+    return "\n".join([done.stdout, *said]) if done.returncode != 0 else None
+
+
+class Tidy:
+    """clang-tidy with the flags of a build tree."""
+
+    def __init__(self, clang_tidy: str, build: str, flags: dict[str, list[str]]):
+        self.clang_tidy = clang_tidy
+        self.build = build
+        self.flags = flags
+
+    def group_passes(self, group: list[str]) -> bool:
+        file = Path(self.build) / "groups" / (group[0].replace("/", "_"))
+        file.parent.mkdir(exist_ok=True)
+        file.write_text("".join(f'#include "{path}"\n' for path in group))
+        checks = "--checks=-bugprone-suspicious-include"
+        command = [self.clang_tidy, "--quiet", checks, str(file), "--", *self.flags[group[0]]]
+        return findings(*command, "-I.") is None
+
+    def passes(self, group: list[str]) -> bool:
+        if len(group) > 1 and self.group_passes(group):
+            return True
+        found = [findings(self.clang_tidy, "-p", self.build, "--quiet", path) for path in group]
+        failed = [text for text in found if text is not None]
+        print("\n".join(failed), end="", flush=True)
+        return not failed
 
 
 def delete_old(folder: Path) -> None:
@@ -123,30 +178,36 @@ def main() -> int:
     folder = stamp_folder()
     folder.mkdir(parents=True, exist_ok=True)
 
-    def stamp(tree: SourceTree, path: str) -> Path:
+    def stamp(tree: SourceTree, group: list[str]) -> Path:
         # For a source of no target, clang-tidy uses the command of a source with a similar name.
-        command = command_of.get(path) or json.dumps(command_of)
-        return folder / tree.stamp(path, f"{common}\0{command}")
+        used = [command_of.get(path) or json.dumps(command_of) for path in group]
+        return folder / tree.stamp(group, "\0".join([common, *used]))
 
+    flags = {path: flags_of(command, path) for path, command in command_of.items()}
+    groups = groups_of([os.path.normpath(path) for path in sources], flags)
     wanted = {}
-    for path in map(os.path.normpath, sources):
-        passed = stamp(tree, path)
+    for group in groups:
+        passed = stamp(tree, group)
         if passed.exists():
             passed.touch()
         else:
-            wanted[path] = passed
+            wanted[tuple(group)] = passed
+    tidy = Tidy(clang_tidy, build, flags)
 
-    def check(path: str) -> bool:
-        good = passes(clang_tidy, build, path)
-        if good and stamp(SourceTree(root), path) == wanted[path]:  # unchanged during the run
-            wanted[path].touch()
+    def check(group: tuple[str, ...]) -> bool:
+        good = tidy.passes([*group])
+        if good and stamp(SourceTree(root), [*group]) == wanted[group]:  # unchanged during the run
+            wanted[group].touch()
         return good
 
     with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
         failed = list(pool.map(check, wanted)).count(False)
     delete_old(folder)
-    before = len(sources) - len(wanted)
-    print(f"clang-tidy: {len(sources)} sources, {before} passed before, {failed} failed")
+    before = len(groups) - len(wanted)
+    print(
+        f"clang-tidy: {len(sources)} sources in {len(groups)} groups, {before} passed before, "
+        f"{failed} failed"
+    )
     return 1 if failed else 0
 
 

@@ -180,7 +180,7 @@ def test_stamp_covers_every_header_that_the_compiler_opens(tree, source):
     ).stdout
     opened = {os.path.relpath(name, ROOT) for name in made.replace("\\\n", " ").split()[1:]}
     opened = {name for name in opened if not name.startswith("..")}
-    listed = set(tree.dependencies(source))
+    listed = set(tree.dependencies([source]))
     assert opened <= listed
     # The compiler skips what conditions exclude, which is rare.
     assert len(listed - opened) <= 2, listed - opened
@@ -206,15 +206,15 @@ def test_changed_header_invalidates_exactly_the_stamps_of_its_includers(tree, tm
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(ROOT / name, folder / name)
     sources = [name for name in names if name.endswith(".cpp")]
-    before = {name: tree.stamp(name, "settings") for name in sources}
+    before = {name: tree.stamp([name], "settings") for name in sources}
     assert {
-        name: clang_tidy.SourceTree(folder).stamp(name, "settings") for name in sources
+        name: clang_tidy.SourceTree(folder).stamp([name], "settings") for name in sources
     } == before
     changed = "sensors/lidar/receiver/waveform.h"
     with (folder / changed).open("a") as header:
         header.write("// changed\n")
     copy = clang_tidy.SourceTree(folder)
-    ended = {name for name in sources if copy.stamp(name, "settings") != before[name]}
+    ended = {name for name in sources if copy.stamp([name], "settings") != before[name]}
     # Found by following includes from the header outwards, where the stamps follow them inwards.
     reached = {changed}
     texts = {name: (ROOT / name).read_text() for name in names}
@@ -229,7 +229,7 @@ def test_changed_header_invalidates_exactly_the_stamps_of_its_includers(tree, tm
         reached |= more
     assert ended == reached & set(sources)
     assert 5 < len(ended) < len(sources) // 2
-    assert len({tree.stamp(sources[0], settings) for settings in ("a", "b")}) == 2
+    assert len({tree.stamp([sources[0]], settings) for settings in ("a", "b")}) == 2
 
 
 def test_only_passing_sources_leave_a_stamp(tmp_path, monkeypatch):
@@ -268,3 +268,52 @@ def test_only_passing_sources_leave_a_stamp(tmp_path, monkeypatch):
     checker.write_text('#!/bin/sh\n[ "$1" = --version ]\n')
     (tmp_path / "good.cpp").write_text("bad\n")
     assert clang_tidy.main() == 1
+
+
+# Two sources of a folder, one of another: what is wrong in a group is found in each source by
+# itself, and a group that passes is not read again. With the clang-tidy that lint uses.
+def test_groups_are_read_as_one_and_their_findings_are_those_of_each_source(tmp_path, monkeypatch):
+    checker = ROOT / ".venv/bin/clang-tidy"
+    if not checker.exists():
+        pytest.skip(f"there is no {checker}")
+    sources = ["a/one.cpp", "a/two.cpp", "b/three.cpp"]
+    for name in sources:
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text("int good() { return 1; }\n".replace("good", name[2:-4]))
+    (tmp_path / ".clang-tidy").write_text(
+        "Checks: '-*,modernize-use-nullptr'\nWarningsAsErrors: '*'\nHeaderFilterRegex: '/[ab]/'\n"
+    )
+    (tmp_path / "test").mkdir()
+    (tmp_path / "test/requirements.txt").write_text("\n")
+    (tmp_path / "build").mkdir()
+    commands = [
+        {
+            "file": str(tmp_path / name),
+            "directory": str(tmp_path / "build"),
+            "command": f"c++ -std=c++20 -I{tmp_path} -o {name}.o -c {tmp_path / name}",
+        }
+        for name in sources
+    ]
+    (tmp_path / "build/compile_commands.json").write_text(json.dumps(commands))
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.setattr("sys.argv", ["clang_tidy.py", "build", str(checker), *sources])
+    read = []
+    findings = clang_tidy.findings
+    monkeypatch.setattr(
+        clang_tidy, "findings", lambda *command: read.append(command) or findings(*command)
+    )
+    assert clang_tidy.main() == 0
+    assert len(read) == 2
+    assert clang_tidy.main() == 0
+    assert len(read) == 2
+    (tmp_path / "a/two.cpp").write_text("int* two() { return 0; }\n")
+    assert clang_tidy.main() == 1
+    assert len(read) == 5  # the group, then both of its sources
+    (tmp_path / "a/two.cpp").write_text("int* two() { return nullptr; }\n")
+    assert clang_tidy.main() == 0
+    assert len(read) == 6
+    # Two of one name do not compile together, but each does alone.
+    (tmp_path / "a/two.cpp").write_text("int one() { return 2; }\n")
+    assert clang_tidy.main() == 0
+    assert len(read) == 9
