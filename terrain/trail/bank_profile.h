@@ -12,6 +12,13 @@ struct Benches {
   double height_m = 5;     ///< of each face
   double width_m = 3;      ///< of each bench
   double roughness_m = 0;  ///< largest setback of a face from its place, which varies along it
+  /// Blocks between the joints and beds of rock, each set back by itself; without them, setbacks
+  /// vary smoothly.
+  struct Blocks {
+    double length_m = 2;  ///< along the line
+    double height_m = 1;  ///< rounded so that a whole number of them makes a face
+  };
+  std::optional<Blocks> blocks{};
 };
 
 /// Profile of the banks of a trail: the height by which cuttings rise and embankments fall beyond
@@ -22,7 +29,7 @@ class BankProfile {
   /// @param benches  with positive height and width, and a roughness of at most the width.
   /// @param variant  selects the setbacks.
   BankProfile(double slope, const std::optional<Benches>& benches, Seed variant)
-      : slope_(slope), benches_(benches), variant_(variant) {}
+      : slope_(slope), benches_(benches), variant_(variant), beds_(beds_of(benches)) {}
 
   /// Returns the height at a distance beyond the edge, beside a place of the line; metres.
   /// @param beyond_m  0 or more.
@@ -33,11 +40,14 @@ class BankProfile {
   double run_m(double height_m) const noexcept;
 
  private:
-  double setback_m(double face, const LinePlace& at, double to_end_m) const noexcept;
+  static int beds_of(const std::optional<Benches>& benches) noexcept;
+  double setback_m(double face, int bed, const LinePlace& at, double to_end_m) const noexcept;
+  double block_noise(RandomKey key, double along_m) const noexcept;
 
   double slope_;
   std::optional<Benches> benches_;
   Seed variant_;
+  int beds_;  ///< of a face; 1 without blocks
 };
 
 }  // namespace groundray

@@ -82,6 +82,13 @@ void check_details(const TrailSpec& spec, double cell_m, Violations& broken) {
     broken.unless(0 <= benches->roughness_m && benches->roughness_m <= benches->width_m,
                   "benches.roughness_m = {} must be from 0 to their width_m, {}",
                   benches->roughness_m, benches->width_m);
+    if (const auto& blocks = benches->blocks) {
+      check_width(blocks->length_m, "benches.blocks.length_m");
+      broken.unless(cell_m <= blocks->height_m && blocks->height_m <= benches->height_m,
+                    "benches.blocks.height_m = {} must be from a cell of the relief, {}, to "
+                    "benches.height_m, {}",
+                    blocks->height_m, cell_m, benches->height_m);
+    }
   }
   if (const auto& roots = spec.roots) {
     check_width(roots->width_m, "roots.width_m");

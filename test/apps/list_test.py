@@ -96,7 +96,7 @@ def test_reflectances_of_matt_materials_are_those_of_their_spectra(path):
     material = yaml.safe_load(path.read_text())
     found = listed("materials")[path.stem]["reflectance_by_nm"]
     if "spectrum" not in material or "coat" in material:
-        assert path.stem in ("aluminium", "iron", "puddle", "retro_reflector", "wet_soil")
+        assert path.stem in ("aluminium", "iron", "puddle", "retro_reflector", "water", "wet_soil")
         return
     spectrum = material["spectrum"]
     wavelengths = spectrum["wavelengths_nm"]

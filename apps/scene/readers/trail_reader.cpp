@@ -71,6 +71,12 @@ Benches read_benches(Map map) {
   map.read_number("height_m", Need::Required, benches.height_m, positive);
   map.read_number("width_m", Need::Required, benches.width_m, positive);
   map.read_number("roughness_m", Need::Optional, benches.roughness_m, not_negative);
+  if (auto part = map.map("blocks", Need::Optional)) {
+    auto& blocks = benches.blocks.emplace();
+    part->read_number("length_m", Need::Optional, blocks.length_m, positive);
+    part->read_number("height_m", Need::Optional, blocks.height_m, positive);
+    part->close();
+  }
   map.close();
   return benches;
 }

@@ -153,6 +153,55 @@ TEST(Benches, RoughFacesAreSetBackByUpToTheirRoughness) {
   EXPECT_GT(most, 0.8 * rough_m);
 }
 
+// Blocks: with the smooth part of the setback, which varies by at most 2 / 3 roughness_m of it,
+// taken from the slow change between neighbours, setbacks are steps at joints 2 m apart, other ones
+// in each bed of 1 m, and stay from 0 to roughness_m.
+TEST(Benches, BlocksEndAtJointsAndBeds) {
+  TrailSpec spec = with_benches(-5);
+  constexpr double rough_m = 0.8, step_m = 0.05, length = 2;
+  spec.benches->roughness_m = rough_m;
+  spec.benches->blocks = {.length_m = length, .height_m = 1.1};  // two beds of 1 m
+  const Trail trail = trail_on(spec, flat_m);
+  // Of the smooth part alone: roughness_m / 2 2 / 3 times a slope of 2 3 / 2 / 6 m.
+  const double most_change = rough_m / 2 * 2 / 3 * 3 / 6.0 * step_m + 1e-9;
+  std::array<std::vector<double>, 2> joints;
+  for (std::size_t bed = 0; bed < 2; ++bed) {
+    // Of the second face, which begins at -3 m, 4 m from the middle; in the middle of each bed.
+    const auto bed_m = static_cast<double>(bed);
+    double before = -1;
+    for (double s = 20; s < 60; s += step_m) {
+      const double setback = offset_at(trail, s, 1, -3 + 0.5 + bed_m) - 4 - (0.5 + bed_m) / 4;
+      ASSERT_LE(setback, rough_m + 1e-9);
+      // Where the bed below is set back further, both rise together.
+      if (bed == 0) {
+        ASSERT_GE(setback, -1e-9);
+      }
+      if (before >= 0 && std::abs(setback - before) > most_change) joints[bed].push_back(s);
+      before = setback;
+    }
+  }
+  // 19 or 20 joints of the lower bed, at equal distances; two steps in 20 are smaller than the
+  // smooth change with a probability below 1e-3.
+  ASSERT_GE(joints[0].size(), 17u);
+  ASSERT_LE(joints[0].size(), 20u);
+  for (const double s : joints[0]) {
+    const double blocks = (s - joints[0].front()) / length;
+    EXPECT_NEAR(blocks, std::round(blocks), step_m / length + 1e-9) << s;
+  }
+  EXPECT_GE(joints[1].size(), 17u);
+  EXPECT_NE(joints[0].front(), joints[1].front());
+}
+
+// A block as high as the face, without roughness, changes nothing.
+TEST(Benches, BlocksWithoutRoughnessLeaveEveryHeight) {
+  TrailSpec spec = with_benches(-5);
+  const Trail smooth = trail_on(spec, flat_m);
+  spec.benches->blocks = {.length_m = 2, .height_m = 0.5};
+  const Trail blocky = trail_on(spec, flat_m);
+  for (double u = 0; u < 9; u += 0.01)
+    ASSERT_NEAR(height_m(smooth, 30, u), height_m(blocky, 30, u), 1e-12) << u;
+}
+
 TEST(Benches, RoughFacesDifferByHeightAndSide) {
   TrailSpec spec = with_benches(-5);
   spec.benches->roughness_m = 0.8;
@@ -218,6 +267,11 @@ TEST(Benches, ErrorsListEveryFault) {
       AllOf(HasSubstr("benches.height_m = 0.04 must be at least a cell of the relief, 0.05"),
             HasSubstr("benches.width_m = 0.09 must be at least two cells"),
             HasSubstr("benches.roughness_m = 0.1 must be from 0 to their width_m, 0.09")));
+  spec.benches = {.height_m = 2, .width_m = 1.5, .blocks = {{.length_m = 0.09, .height_m = 2.5}}};
+  EXPECT_THAT(error_of(spec),
+              AllOf(HasSubstr("benches.blocks.length_m = 0.09 must be at least two cells"),
+                    HasSubstr("benches.blocks.height_m = 2.5 must be from a cell of the relief, "
+                              "0.05, to benches.height_m, 2")));
   spec.benches = {.height_m = 0.25, .width_m = 10};
   // 23 benches below the last face, and 6 / 4 m of faces.
   EXPECT_THAT(error_of(spec),
@@ -234,6 +288,8 @@ TEST(Benches, ChangeTheFingerprint) {
   };
   add();
   spec.benches->roughness_m = 0.5;
+  add();
+  spec.benches->blocks.emplace();
   add();
   spec.benches->width_m = 1;
   add();

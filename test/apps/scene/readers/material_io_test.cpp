@@ -21,9 +21,10 @@ using ::testing::HasSubstr;
 using ::testing::ThrowsMessage;
 
 constexpr const char* const all_names[] = {
-    "aluminium", "asphalt",         "bark", "broad_leaf", "char",     "dry_grass",
-    "dry_soil",  "gravel",          "iron", "leaf",       "litter",   "metal",
-    "puddle",    "retro_reflector", "rock", "sand",       "wet_soil", "wood"};
+    "aluminium",    "ash",       "asphalt",   "bark",     "broad_leaf", "char",
+    "charred_wood", "dark_soil", "dry_grass", "dry_soil", "gravel",     "grey_gravel",
+    "iron",         "leaf",      "litter",    "metal",    "puddle",     "retro_reflector",
+    "rock",         "sand",      "water",     "wet_soil", "wood"};
 
 Material built_in(const std::string& name) {
   return load_material(data_folder() / "materials" / (name + ".yaml"));
@@ -201,6 +202,9 @@ TEST(MaterialIo, BuiltInColoursMatchTheirNames) {
     return bsdf.eval(wo, glm::normalize(glm::dvec3(0, 0.5, 1)));
   };
   EXPECT_LT(colour("wet_soil").y, colour("dry_soil").y);
+  EXPECT_LT(colour("dark_soil").y, colour("dry_soil").y / 2);
+  EXPECT_LT(colour("water").y, colour("puddle").y / 2);
+  EXPECT_LT(colour("charred_wood").y, colour("ash").y / 2);
   EXPECT_GT(colour("aluminium").y, colour("iron").y);
   EXPECT_GT(colour("broad_leaf").y, 1.5 * colour("broad_leaf").x);
   EXPECT_GT(colour("broad_leaf").y, 1.5 * colour("broad_leaf").z);
@@ -213,8 +217,8 @@ TEST(MaterialIo, BuiltInSpectraHaveTheKnownShapesOfTheirClasses) {
   EXPECT_GT(reflectance("leaf", 850), 4 * reflectance("leaf", 660));
   EXPECT_LT(reflectance("leaf", 1450), reflectance("leaf", 1300) / 2);  // water
   EXPECT_GT(reflectance("broad_leaf", 850), 4 * reflectance("broad_leaf", 660));
-  for (const char* name :
-       {"dry_soil", "sand", "rock", "dry_grass", "bark", "asphalt", "litter", "wood", "char"}) {
+  for (const char* name : {"dry_soil", "dark_soil", "sand", "rock", "grey_gravel", "dry_grass",
+                           "bark", "asphalt", "litter", "wood", "char", "charred_wood", "ash"}) {
     EXPECT_LT(reflectance(name, 550), reflectance(name, 905)) << name;
   }
   EXPECT_LT(reflectance("asphalt", 905), 0.15);
