@@ -94,33 +94,27 @@ def common_settings(root: Path, clang_tidy: str) -> str:
     return "\0".join([run(clang_tidy, "--version"), packages, *python_headers, settings])
 
 
-def commands(build: Path, root: Path) -> dict[str, str]:
-    """Returns the compile command of each source of the tree, without the path of its root."""
-    entries = json.loads((build / "compile_commands.json").read_text())
-    return {
-        os.path.relpath(entry["file"], root): entry["command"].replace(str(root), ".")
-        for entry in entries
-    }
+def flags_by_source(build: Path, root: Path) -> dict[str, list[str]]:
+    """Returns the flags of each source of the tree, with paths relative to its root."""
+    flags = {}
+    for entry in json.loads((build / "compile_commands.json").read_text()):
+        command = entry["command"].replace(f"{root}/", "").replace(str(root), ".")
+        words = shlex.split(command)[1:]
+        path = os.path.relpath(entry["file"], root)
+        without = {"-c", "-o", path}
+        flags[path] = [
+            word
+            for before, word in zip(["", *words], words, strict=False)
+            if word not in without and before != "-o"
+        ]
+    return flags
 
 
-def flags_of(command: str, path: str) -> list[str]:
-    """Returns the flags of a compile command: without compiler, source and object."""
-    words = shlex.split(command)[1:]
-    kept = []
-    for word in words:
-        if kept and kept[-1] == "-o":
-            kept.pop()
-        elif word != "-c" and not word.endswith(path):
-            kept.append(word)
-    return kept
-
-
-def groups_of(sources: list[str], flags: dict[str, list[str]]) -> list[list[str]]:
-    """Returns the sources in groups of one folder, with equal flags; those of no target singly."""
+def groups_of(flags: dict[str, list[str]]) -> list[list[str]]:
+    """Returns the sources in groups of one folder, with equal flags."""
     alike: dict[tuple[str, ...], list[str]] = {}
-    for path in sources:
-        key = (os.path.dirname(path), *flags[path]) if path in flags else (path,)
-        alike.setdefault(key, []).append(path)
+    for path, words in flags.items():
+        alike.setdefault((os.path.dirname(path), *words), []).append(path)
     return [
         paths[i : i + MOST_IN_GROUP]
         for paths in alike.values()
@@ -136,29 +130,22 @@ def findings(*command: str) -> str | None:
     return "\n".join([done.stdout, *said]) if done.returncode != 0 else None
 
 
-class Tidy:
-    """clang-tidy with the flags of a build tree."""
+def passes(clang_tidy: str, group: list[str], flags: list[str], folder: Path) -> bool:
+    """Prints the findings of a group of sources.
 
-    def __init__(self, clang_tidy: str, build: str, flags: dict[str, list[str]]):
-        self.clang_tidy = clang_tidy
-        self.build = build
-        self.flags = flags
-
-    def group_passes(self, group: list[str]) -> bool:
-        file = Path(self.build) / "groups" / (group[0].replace("/", "_"))
-        file.parent.mkdir(exist_ok=True)
+    :param folder: of files that include the sources of a group.
+    """
+    quietly = [clang_tidy, "--quiet"]
+    if len(group) > 1:
+        file = folder / group[0].replace("/", "_")
         file.write_text("".join(f'#include "{path}"\n' for path in group))
-        checks = "--checks=-bugprone-suspicious-include"
-        command = [self.clang_tidy, "--quiet", checks, str(file), "--", *self.flags[group[0]]]
-        return findings(*command, "-I.") is None
-
-    def passes(self, group: list[str]) -> bool:
-        if len(group) > 1 and self.group_passes(group):
+        options = ["--checks=-bugprone-suspicious-include", str(file), "--", *flags, "-I."]
+        if findings(*quietly, *options) is None:
             return True
-        found = [findings(self.clang_tidy, "-p", self.build, "--quiet", path) for path in group]
-        failed = [text for text in found if text is not None]
-        print("\n".join(failed), end="", flush=True)
-        return not failed
+    found = [findings(*quietly, path, "--", *flags) for path in group]
+    failed = [text for text in found if text is not None]
+    print("\n".join(failed), end="", flush=True)
+    return not failed
 
 
 def delete_old(folder: Path) -> None:
@@ -174,17 +161,19 @@ def main() -> int:
     root = Path.cwd().resolve()
     tree = SourceTree(root)
     common = common_settings(root, clang_tidy)
-    command_of = commands(Path(build), root)
+    known = flags_by_source(Path(build), root)
+    # A source of no target is given the flags of the target that uses most libraries.
+    richest = max(known.values(), key=lambda flags: (len(flags), flags), default=[])
+    flags = {path: known.get(path, richest) for path in map(os.path.normpath, sources)}
+    groups = groups_of(flags)
     folder = stamp_folder()
     folder.mkdir(parents=True, exist_ok=True)
+    files = Path(build) / "groups"
+    files.mkdir(exist_ok=True)
 
     def stamp(tree: SourceTree, group: list[str]) -> Path:
-        # For a source of no target, clang-tidy uses the command of a source with a similar name.
-        used = [command_of.get(path) or json.dumps(command_of) for path in group]
-        return folder / tree.stamp(group, "\0".join([common, *used]))
+        return folder / tree.stamp(group, "\0".join([common, *flags[group[0]]]))
 
-    flags = {path: flags_of(command, path) for path, command in command_of.items()}
-    groups = groups_of([os.path.normpath(path) for path in sources], flags)
     wanted = {}
     for group in groups:
         passed = stamp(tree, group)
@@ -192,10 +181,9 @@ def main() -> int:
             passed.touch()
         else:
             wanted[tuple(group)] = passed
-    tidy = Tidy(clang_tidy, build, flags)
 
     def check(group: tuple[str, ...]) -> bool:
-        good = tidy.passes([*group])
+        good = passes(clang_tidy, [*group], flags[group[0]], files)
         if good and stamp(SourceTree(root), [*group]) == wanted[group]:  # unchanged during the run
             wanted[group].touch()
         return good

@@ -239,12 +239,16 @@ def test_only_passing_sources_leave_a_stamp(tmp_path, monkeypatch):
     (tmp_path / "test").mkdir()
     (tmp_path / "test/requirements.txt").write_text("\n")
     (tmp_path / "build").mkdir()
-    (tmp_path / "build/compile_commands.json").write_text(json.dumps([]))
+    flags = [["-Dgood"], ["-Dbad"]]  # different ones, so that each is read by itself
+    commands = [
+        {"file": str(tmp_path / f"{word[0][2:]}.cpp"), "command": f"c++ {word[0]}"}
+        for word in flags
+    ]
+    (tmp_path / "build/compile_commands.json").write_text(json.dumps(commands))
     ran = tmp_path / "ran"
     checker = tmp_path / "checker"  # stands in for clang-tidy: a text with "bad" fails
     checker.write_text(
-        f'#!/bin/sh\n[ "$1" = --version ] && exit\nfor file; do :; done\n'
-        f'echo "$file" >>{ran}\n! grep -q bad "$file"\n'
+        f'#!/bin/sh\n[ "$1" = --version ] && exit\necho "$2" >>{ran}\n! grep -q bad "$2"\n'
     )
     checker.chmod(0o755)
     monkeypatch.chdir(tmp_path)
