@@ -4,8 +4,8 @@ scenes in data/scenes/worlds.
     pip install pillow pyyaml
     python3 docs/pictures/draw_worlds.py build/release/bin out/worlds [SCENE …]
 
-The pictures are the cameras' own, with 8 paths a pixel: one to four minutes of two cores each. With
-names of scenes, only these are made anew, if out/worlds has the others.
+The pictures are the cameras' own, with 8 to 32 paths a pixel: two to eight minutes of two cores
+each. With names of scenes, only these are made anew, if out/worlds has the others.
 """
 
 import pathlib
@@ -20,7 +20,7 @@ SCENES = (
     *("meadow", "forest_track", "gravel_pit", "desert_wash", "moor", "vineyard"),
     *("alpine_path", "river_bank", "burnt_forest", "tundra", "plantation", "stone_quarry"),
 )
-SAMPLES = 8
+SAMPLING = {"samples": 8, "most_samples": 32, "relative_error": 0.15}
 COLUMNS, WIDTH, GAP = 3, 400, 6
 
 
@@ -32,7 +32,7 @@ def picture_of(name, programs, folder):
     camera = scene["cameras"][0]
     scene["cameras"] = [camera]
     camera["file"] = str(path.parent / camera["file"])
-    camera["sampling"] |= {"samples": SAMPLES, "most_samples": SAMPLES}
+    camera["sampling"] |= SAMPLING
     camera["products"] = ["picture"]
     camera.pop("project", None)
     (folder / f"{name}.yaml").write_text(yaml.safe_dump(scene))
