@@ -57,6 +57,7 @@ FOLDERS: dict[str, str] = {
     "terrain/scatter": "terrain terrain/dem terrain/lod",
     "terrain/textures": "terrain/lod",
     "terrain/trail": "terrain/dem",
+    "terrain/traversability": "terrain terrain/lod",
     "terrain/water": "terrain terrain/lod",
 }
 

@@ -30,6 +30,8 @@ struct Command {
 void add_run_commands(CLI::App& app, std::vector<Command>& commands);
 /// Adds `sample` to the program: worlds of a scene, whose values are drawn.
 Command add_sample_command(CLI::App& app);
+/// Adds `traversability` to the program: layers of the ground for a vehicle.
+Command add_traversability_command(CLI::App& app);
 /// Adds `list` to the program: the presets, materials and assets that a scene file can name.
 Command add_list_command(CLI::App& app);
 /// Adds `terrain` to the program: meshes, certificates and fills of DEMs.

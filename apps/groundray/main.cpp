@@ -26,7 +26,7 @@ constexpr int failed = 1;
 constexpr int interrupted = 130;
 
 // Commands by task, for help.
-constexpr std::array<std::pair<const char*, const char*>, 8> tasks{
+constexpr std::array<std::pair<const char*, const char*>, 9> tasks{
     {{"generate", "Simulate sensors"},
      {"sample", "Simulate sensors"},
      {"verify", "Simulate sensors"},
@@ -34,6 +34,7 @@ constexpr std::array<std::pair<const char*, const char*>, 8> tasks{
      {"info", "Look at files and data"},
      {"list", "Look at files and data"},
      {"terrain", "Work on terrain and measurements"},
+     {"traversability", "Work on terrain and measurements"},
      {"reconstruct", "Work on terrain and measurements"}}};
 
 int run(int argc, char** argv) {
@@ -66,6 +67,7 @@ int run(int argc, char** argv) {
   commands.push_back({info, [&] { groundray::print_info(file); }});
   commands.push_back(groundray::add_list_command(app));
   groundray::add_terrain_commands(app, commands);
+  commands.push_back(groundray::add_traversability_command(app));
   groundray::add_reconstruct_commands(app, commands);
 
   for (const auto& [name, task] : tasks) app.get_subcommand(name)->group(task);

@@ -9,6 +9,7 @@
 #include <glm/common.hpp>
 #include <limits>
 #include <string_view>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -18,20 +19,28 @@
 namespace groundray {
 namespace {
 
-void check_raster_layers(const GridFrame& frame, const Georeference& georeference,
-                         std::span<const RasterLayer> layers) {
-  Violations broken("raster layers");
-  broken.unless(!layers.empty(), "there are no layers");
+void check_grid(const GridFrame& frame, const Georeference& georeference, Violations& broken) {
   broken.unless(frame.samples.x >= 2 && frame.samples.y >= 2,
                 "they have {} x {} samples; a surface needs 2 x 2 or more", frame.samples.x,
                 frame.samples.y);
   broken.unless(georeference.origin_w_m.z == 0, "the height of D's origin is {} m; it must be 0",
                 georeference.origin_w_m.z);
+}
+
+void check_count(const GridFrame& frame, const std::string& name, std::size_t values,
+                 Violations& broken) {
   const std::size_t samples =
       static_cast<std::size_t>(frame.samples.x) * static_cast<std::size_t>(frame.samples.y);
+  broken.unless(values == samples, "{} has {} values for {} samples", name, values, samples);
+}
+
+void check_raster_layers(const GridFrame& frame, const Georeference& georeference,
+                         std::span<const RasterLayer> layers) {
+  Violations broken("raster layers");
+  broken.unless(!layers.empty(), "there are no layers");
+  check_grid(frame, georeference, broken);
   for (const RasterLayer& layer : layers)
-    broken.unless(layer.values.size() == samples, "{} has {} values for {} samples", layer.name,
-                  layer.values.size(), samples);
+    check_count(frame, layer.name, layer.values.size(), broken);
   broken.throw_if_any();
 }
 
@@ -45,23 +54,24 @@ bool is_misleading(double nodata, std::span<const RasterLayer> layers) {
 }
 
 // Adds a band that GDAL reads without a copy, from north and west.
-void add_band(GDALDataset& dataset, const GridFrame& frame, const RasterLayer& layer,
-              double nodata) {
+template <typename Value>
+GDALRasterBand& add_band(GDALDataset& dataset, const GridFrame& frame,
+                         std::span<const Value> values, const std::string& name, double nodata) {
   const std::int64_t columns = frame.samples.x, rows = frame.samples.y;
   const bool is_from_west = frame.step_m.x > 0, is_from_north = frame.step_m.y < 0;
-  const float* const first = layer.values.data() + (is_from_west ? 0 : columns - 1) +
-                             (is_from_north ? 0 : (rows - 1) * columns);
-  constexpr std::int64_t bytes = sizeof(float);
+  const Value* const first =
+      values.data() + (is_from_west ? 0 : columns - 1) + (is_from_north ? 0 : (rows - 1) * columns);
+  constexpr std::int64_t bytes = sizeof(Value);
   CPLStringList options;
   options.SetNameValue("DATAPOINTER", fmt::format("{}", static_cast<const void*>(first)).c_str());
   options.SetNameValue("PIXELOFFSET", fmt::format("{}", is_from_west ? bytes : -bytes).c_str());
   options.SetNameValue(
       "LINEOFFSET", fmt::format("{}", is_from_north ? bytes * columns : -bytes * columns).c_str());
-  dataset.AddBand(GDT_Float32, options.List());
+  dataset.AddBand(std::is_same_v<Value, float> ? GDT_Float32 : GDT_Byte, options.List());
   GDALRasterBand& band = *dataset.GetRasterBand(dataset.GetRasterCount());
-  band.SetDescription(layer.name.c_str());
+  band.SetDescription(name.c_str());
   band.SetNoDataValue(nodata);
-  if (!layer.unit.empty()) band.SetUnitType(layer.unit.c_str());
+  return band;
 }
 
 OGRSpatialReference crs_of(const Georeference& georeference) {
@@ -89,16 +99,26 @@ void place(GDALDataset& dataset, const GridFrame& frame, const Georeference& geo
   dataset.SetSpatialRef(&crs);
 }
 
-GDALDatasetUniquePtr layers_dataset(const GridFrame& frame, const Georeference& georeference,
-                                    std::span<const RasterLayer> layers, double nodata,
-                                    const RasterForm& form) {
+// Returns a dataset in memory without bands.
+GDALDatasetUniquePtr empty_dataset(const GridFrame& frame, const Georeference& georeference,
+                                   bool is_point) {
   GDALDriver& memory = *GetGDALDriverManager()->GetDriverByName("MEM");
   GDALDatasetUniquePtr dataset(
       memory.Create("", frame.samples.x, frame.samples.y, 0, GDT_Float32, nullptr));
   if (dataset == nullptr) throw Error("not enough memory for a raster: {}", CPLGetLastErrorMsg());
-  for (const RasterLayer& layer : layers) add_band(*dataset, frame, layer, nodata);
   place(*dataset, frame, georeference);
-  dataset->SetMetadataItem("AREA_OR_POINT", form.is_point ? "Point" : "Area");
+  dataset->SetMetadataItem("AREA_OR_POINT", is_point ? "Point" : "Area");
+  return dataset;
+}
+
+GDALDatasetUniquePtr layers_dataset(const GridFrame& frame, const Georeference& georeference,
+                                    std::span<const RasterLayer> layers, double nodata,
+                                    const RasterForm& form) {
+  GDALDatasetUniquePtr dataset = empty_dataset(frame, georeference, form.is_point);
+  for (const RasterLayer& layer : layers) {
+    GDALRasterBand& band = add_band(*dataset, frame, layer.values, layer.name, nodata);
+    if (!layer.unit.empty()) band.SetUnitType(layer.unit.c_str());
+  }
   return dataset;
 }
 
@@ -171,6 +191,26 @@ void write_layers(const std::filesystem::path& path, const GridFrame& frame,
   }
   const GDALDatasetUniquePtr source = layers_dataset(frame, georeference, stored, nodata, form);
   copy_whole(path, *source, cog_options(layers));
+}
+
+void write_byte_layer(const std::filesystem::path& path, const GridFrame& frame,
+                      const Georeference& georeference, const std::string& name,
+                      std::span<const std::uint8_t> values, std::uint8_t nodata) {
+  about(path, [&] {
+    Violations broken("raster layer");
+    check_grid(frame, georeference, broken);
+    check_count(frame, name, values.size(), broken);
+    broken.throw_if_any();
+  });
+  start_gdal();
+  const CPLErrorHandlerPusher quiet(CPLQuietErrorHandler);
+  const GDALDatasetUniquePtr source = empty_dataset(frame, georeference, false);
+  add_band(*source, frame, values, name, nodata);
+  CPLStringList options;
+  options.AddNameValue("COMPRESS", "DEFLATE");
+  options.AddNameValue("BIGTIFF", "IF_SAFER");
+  options.AddNameValue("OVERVIEW_RESAMPLING", "NEAREST");
+  copy_whole(path, *source, options);
 }
 
 }  // namespace groundray

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <span>
@@ -47,5 +48,15 @@ void check_crs(const Georeference& georeference);
 void write_layers(const std::filesystem::path& path, const GridFrame& frame,
                   const Georeference& georeference, std::span<const RasterLayer> layers,
                   const RasterForm& form = {});
+
+/// Writes one layer of bytes, such as flags, as write_layers writes floats; its overviews are
+/// single samples.
+/// @param name    quantity: "verdict".
+/// @param values  one per sample of the frame, row by row.
+/// @param nodata  value for none.
+/// @throws Error as write_layers.
+void write_byte_layer(const std::filesystem::path& path, const GridFrame& frame,
+                      const Georeference& georeference, const std::string& name,
+                      std::span<const std::uint8_t> values, std::uint8_t nodata);
 
 }  // namespace groundray

@@ -22,6 +22,7 @@ PROGRAMS = [
 COMMANDS = {
     "groundray": [
         *("generate", "sample", "verify", "merge", "info", "list", "terrain", "reconstruct"),
+        "traversability",
         *(f"terrain {what}" for what in ("mesh", "certify", "fill")),
         *(f"reconstruct {what}" for what in ("mesh", "simplify", "fill", "dem")),
     ],
@@ -75,7 +76,10 @@ printf '%s\\n' "${{COMPREPLY[@]}}"
     [
         (
             "groundray ",
-            {"generate", "sample", "verify", "merge", "info", "list", "terrain", "reconstruct"},
+            {
+                *("generate", "sample", "verify", "merge", "info", "list", "terrain"),
+                *("traversability", "reconstruct"),
+            },
         ),
         ("groundray ge", {"generate"}),
         ("groundray terrain ", {"mesh", "certify", "fill"}),

@@ -4,7 +4,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <fstream>
 #include <limits>
 #include <memory>
@@ -167,6 +169,30 @@ TEST_F(LayersIo, NamesEachBandAndKeepsTheCrs) {
   ASSERT_EQ(counts.RasterIO(GF_Read, 0, 0, 3, 2, read.data(), 3, 2, GDT_Float32, 0, 0, nullptr),
             CE_None);
   EXPECT_EQ(read, counts_);
+}
+
+TEST_F(LayersIo, WritesBytesNorthUpWithTheirNodataValue) {
+  const std::vector<std::uint8_t> flags{0, 1, 255, 4, 9, 2};
+  for (const double direction : {1.0, -1.0}) {
+    GridFrame frame = frame_;
+    frame.origin_m = direction * frame_.origin_m;
+    frame.step_m = direction * frame_.step_m;
+    write_byte_layer(file_, frame, place_, "verdict", flags, 255);
+    const GDALDatasetUniquePtr opened(GDALDataset::Open(file_.c_str()));
+    ASSERT_EQ(opened->GetRasterCount(), 1);
+    GDALRasterBand& band = *opened->GetRasterBand(1);
+    EXPECT_EQ(band.GetRasterDataType(), GDT_Byte);
+    EXPECT_EQ(band.GetNoDataValue(), 255);
+    EXPECT_STREQ(band.GetDescription(), "verdict");
+    std::vector<std::uint8_t> read(6);
+    ASSERT_EQ(band.RasterIO(GF_Read, 0, 0, 3, 2, read.data(), 3, 2, GDT_Byte, 0, 0, nullptr),
+              CE_None);
+    std::vector<std::uint8_t> expected = flags;
+    if (direction < 0) std::ranges::reverse(expected);
+    EXPECT_EQ(read, expected);
+  }
+  EXPECT_THROW(write_byte_layer(file_, frame_, place_, "verdict", std::span(flags).first(4), 255),
+               Error);
 }
 
 TEST_F(LayersIo, RejectsLayersOfWrongSize) {
