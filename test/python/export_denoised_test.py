@@ -1,6 +1,7 @@
 """Denoised pictures: nearer to the true radiance than the noisy ones, and never taken for truth."""
 
 import hashlib
+import importlib.util
 import os
 import resource
 import shutil
@@ -204,9 +205,9 @@ def test_what_is_left_out_is_reported(run, tmp_path, capsys):
 
 
 def test_a_missing_package_is_one_message_with_the_remedy(run, tmp_path, capsys, monkeypatch):
-    found = command.importlib.util.find_spec
+    found = importlib.util.find_spec
     monkeypatch.setattr(
-        command.importlib.util, "find_spec", lambda name: None if name == "pyoidn" else found(name)
+        importlib.util, "find_spec", lambda name: None if name == "pyoidn" else found(name)
     )
     assert command.main([str(run), "--to", "denoised", "-o", str(tmp_path / "out")]) == 1
     assert capsys.readouterr().err == (

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import difflib
 import errno
+import json
 import math
 import os
 import re
@@ -201,6 +202,16 @@ class _Map:
             raise self.fault("classes", "must be a map of labels to classes")
         return {int(label): name for label, name in classes.items()}
 
+    def texts(self, key: str) -> dict[str, str]:
+        """Returns the values of a map as texts, lists and maps as JSON; none without the key."""
+        values = self.values.get(key, {})
+        if not isinstance(values, dict):
+            raise self.fault(key, "must be a map of keys and values; was the file cut short?")
+        return {
+            str(each): value if isinstance(value, str) else json.dumps(value)
+            for each, value in values.items()
+        }
+
     def maps(self, key: str, *, is_optional: bool = False) -> list[_Map]:
         value = self.values.get(key, []) if is_optional else self.get(key)
         if not isinstance(value, list):
@@ -222,7 +233,8 @@ def _refuse_aliases(text: str, path: Path) -> None:
             raise Error(f"{path}{place}: aliases (*name) are not allowed: write the value out")
 
 
-def _load_yaml(text: str, path: Path, loader: Any = _LOADER) -> Any:
+def load_yaml(text: str, path: Path, loader: Any = _LOADER) -> Any:
+    """Returns the content of a file's text; numbers are texts. Raises Error with the place."""
     try:
         _refuse_aliases(text, path)
         return yaml.load(text, Loader=loader)
@@ -272,7 +284,7 @@ def read_yaml(path: Path, hint: str = "is the dataset complete?") -> Any:
     """Returns a YAML file's content, with numbers as such. Raises Error, with the hint, if it
     cannot be read.
     """
-    return _load_yaml(read_text(path, hint), path, yaml.SafeLoader)
+    return load_yaml(read_text(path, hint), path, yaml.SafeLoader)
 
 
 def read_listed(file: Path, what: str) -> bytes:
@@ -285,7 +297,7 @@ def read_listed(file: Path, what: str) -> bytes:
 
 
 def _read_map(path: Path) -> _Map:
-    return _Map(path, _load_yaml(read_text(path), path))
+    return _Map(path, load_yaml(read_text(path), path))
 
 
 def _read_mount(calibration: _Map, key: str) -> Floats:
@@ -328,6 +340,8 @@ class Dataset:
             )
         self.version = root.text("version", "")
         self.seed = root.text("seed", "")
+        self.world = root.whole("world") if "world" in root.values else None
+        self.drawn = root.texts("drawn")
         self.time_origin_ns = root.time_ns("time_origin_s") if "time_origin_s" in root.values else 0
         self.origin_w_m: Floats = np.array(root.numbers("origin_w_m", 3))
         self.crs = root.text("crs", "")
@@ -442,9 +456,9 @@ def _camera(name: str, number: int, frames: tuple[Frame, ...], calibration: _Map
 
 def _receiver(name: str, calibration: _Map, scene: str) -> dict[str, Any]:
     """Returns the receiver of the scene, else of the lidar's file; empty without a laser."""
-    own = _load_yaml(calibration.text("lidar_file", "{}"), calibration.path)
+    own = load_yaml(calibration.text("lidar_file", "{}"), calibration.path)
     settings: dict[str, Any] = dict(own) if isinstance(own, dict) else {}
-    of_scene = _load_yaml(scene, calibration.path) if scene else {}
+    of_scene = load_yaml(scene, calibration.path) if scene else {}
     lidars = of_scene.get("lidars", []) if isinstance(of_scene, dict) else []
     for lidar in lidars if isinstance(lidars, list) else []:
         if isinstance(lidar, dict) and lidar.get("name") == name:

@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import importlib.util
 import os
 import shutil
-import signal
 import sys
-import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from types import FrameType
 
 from groundray.dataset import Camera, Dataset, Error, Lidar
 from groundray.export import clouds, denoised, kitti, label_images, las, ros_bag, tum
@@ -20,9 +16,9 @@ from groundray.export.label_sets import LabelSet, find_set
 from groundray.export.labels import LabelMap
 from groundray.export.notes import Notes, tell_of_columns, tell_of_products
 from groundray.export.scan import FullScale
+from groundray.guarded_work import DONE, run_guarded
+from groundray.packages import check_packages
 from groundray.shell_text import add_text_options
-
-DONE, FAILED, INTERRUPTED = 0, 1, 130  # argparse exits with 2 on wrong usage
 
 _FORMS = (
     "kitti",
@@ -249,17 +245,6 @@ def _export(options: argparse.Namespace, out: Path, dataset: Dataset, notes: Not
     return ros_bag.write_bag(dataset, lidars, cameras, bag, out, notes)
 
 
-def _check_packages(form: str) -> None:
-    missing = [
-        name
-        for module, name in _PACKAGES.get(form, {}).items()
-        if importlib.util.find_spec(module) is None
-    ]
-    if missing:
-        rule = f"{form} needs {', '.join(missing)}, which is not installed"
-        raise Error(f"{rule}: pip install {' '.join(missing)}")
-
-
 def _open(options: argparse.Namespace) -> Dataset:
     dataset = Dataset(options.dataset)
     if dataset.pending and not options.skip_pending:
@@ -297,55 +282,6 @@ def _written_aside(out: Path, dataset: Path) -> Iterator[Path]:
                 each.rmdir()
 
 
-class _Interrupts:
-    """Raises KeyboardInterrupt on SIGINT and SIGTERM, and notes that one came.
-
-    The note matters because compiled libraries (lazrs, for one) turn the exceptions of the Python
-    code that they call into exceptions of their own.
-    """
-
-    def __init__(self) -> None:
-        self.came = False
-
-    def _interrupt(self, _signal: int, _frame: FrameType | None) -> None:
-        self.came = True
-        raise KeyboardInterrupt
-
-    @contextmanager
-    def raised(self) -> Iterator[None]:
-        """Handles both signals within, if in the main thread; restores the handlers at the end."""
-        if threading.current_thread() is not threading.main_thread():
-            yield
-            return
-        numbers = (signal.SIGINT, signal.SIGTERM)
-        before = [signal.signal(number, self._interrupt) for number in numbers]
-        try:
-            yield
-        finally:
-            for number, handler in zip(numbers, before, strict=True):
-                signal.signal(number, handler)
-
-
-def _guarded(work: Callable[[], str]) -> tuple[int, str]:
-    """Runs work; returns the exit code and a message."""
-    interrupts = _Interrupts()
-    interrupted = INTERRUPTED, "interrupted; nothing was written"
-    try:
-        with interrupts.raised():
-            return DONE, work()
-    except KeyboardInterrupt:
-        return interrupted
-    except Exception as fault:
-        if interrupts.came:
-            return interrupted
-        if isinstance(fault, Error):
-            return FAILED, str(fault)
-        if isinstance(fault, OSError):
-            place = f"{fault.filename}: " if fault.filename else ""
-            return FAILED, f"{place}{fault.strerror or fault}; nothing was written"
-        raise
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs the command; returns its exit code."""
     parser = _parser()
@@ -354,14 +290,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     notes = Notes()
 
     def work() -> str:
-        _check_packages(options.to)
+        check_packages(_PACKAGES.get(options.to, {}), options.to)
         dataset = _open(options)
         if dataset.pending:
             notes.tell(f"{dataset.pending} frames are pending and skipped")
         with _written_aside(options.output, options.dataset) as folder:
             return _export(options, folder, dataset, notes)
 
-    code, told = _guarded(work)
+    code, told = run_guarded(work)
     if code != DONE:
         print(f"groundray-export: {told}", file=sys.stderr)
         return code

@@ -42,14 +42,18 @@ def has_depths(dataset: Dataset, camera: Camera) -> bool:
 
 def read_picture(dataset: Dataset, camera: Camera, frame: Frame) -> Picture:
     """Reads a picture. Raises Error if it is missing, truncated or of another size."""
-    file = dataset.image_file(camera, frame, ".png")
+    return picture_in(dataset.image_file(camera, frame, ".png"), camera.size_px)
+
+
+def picture_in(file: Path, size_px: tuple[int, int]) -> Picture:
+    """Reads the picture in a file of this width and height. Raises Error as read_picture does."""
     data = read_listed(file, "the image")
     # Signature, then the chunk IHDR; the last one is IEND, which is empty.
     if data[:8] != b"\x89PNG\r\n\x1a\n" or data[12:16] != b"IHDR" or data[-8:-4] != b"IEND":
         raise Error(f"{file}: it is not a complete PNG file: it is damaged; generate it again")
     width, height, bits, colours = struct.unpack(">IIBB", data[16:26])
-    if (width, height) != camera.size_px or bits not in (8, 16) or colours not in (_GREY, _COLOUR):
-        rule = f"must have {camera.size_px[0]} x {camera.size_px[1]} pixels, grey or RGB"
+    if (width, height) != size_px or bits not in (8, 16) or colours not in (_GREY, _COLOUR):
+        rule = f"must have {size_px[0]} x {size_px[1]} pixels, grey or RGB"
         raise Error(f"{file}: it {rule}, as its calibration states; is it from another camera?")
     return Picture(file, data, bits, colours == _COLOUR)
 

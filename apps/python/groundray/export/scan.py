@@ -142,7 +142,11 @@ class FullScale:
 
 def read_scan(dataset: Dataset, lidar: Lidar, frame: Frame) -> Scan:
     """Reads one scan. Raises Error if it is missing, truncated, or not a scan of groundray."""
-    file = dataset.scan_file(lidar, frame)
+    return Scan(lidar, frame, read_rows(dataset.scan_file(lidar, frame)))
+
+
+def read_rows(file: Path) -> NDArray[Any]:
+    """Reads the rows of a scan's file. Raises Error as read_scan does."""
     data = read_listed(file, "it")
     dtype, count, offset = _read_header(data, file)
     expected = offset + count * dtype.itemsize
@@ -154,7 +158,7 @@ def read_scan(dataset: Dataset, lidar: Lidar, frame: Frame) -> Scan:
     if not finite or not np.all((rows["time"] >= 0) & (rows["time"] < 3600)):
         rule = "it has points with invalid coordinates or times"
         raise Error(f"{file}: {rule}: it is damaged; generate it again")
-    return Scan(lidar, frame, rows)
+    return rows
 
 
 def _read_header(data: bytes, file: Path) -> tuple[np.dtype[Any], int, int]:
