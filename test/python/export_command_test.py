@@ -11,17 +11,19 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 import yaml
-from export_runs import PACKAGE, export, fails, names_in, run_folder
+from detection_runs import FORMS as OF_BOXES
+from detection_runs import copy_of, source_of
+from export_runs import PACKAGE, export, fails, names_in
 from groundray.export import clouds
 
-FORMS = ["kitti", "semantic-kitti", "tum", "pcd", "las", "laz", "npz", "mcap"]
+FORMS = ["kitti", "semantic-kitti", "tum", "pcd", "las", "laz", "npz", "mcap", *OF_BOXES]
 COMMAND = [sys.executable, "-m", "groundray.export"]
 
 
 @pytest.fixture
-def run(tmp_path):
+def run(tmp_path, request):
     """A copy of the dataset that tests may modify."""
-    return shutil.copytree(run_folder(), tmp_path / "run")
+    return copy_of(request, tmp_path / "run")
 
 
 def edit(file, old, new, count=1):
@@ -52,9 +54,9 @@ def only(run, kind, frames=None):
 
 @pytest.mark.parametrize("form", FORMS)
 def test_equal_datasets_yield_equal_files_in_every_format(tmp_path, form):
-    assert export(form, tmp_path / "a" / "one") == 0
+    assert export(form, tmp_path / "a" / "one", source=source_of(form)) == 0
     (tmp_path / "two").mkdir()  # an empty folder will do
-    assert export(form, tmp_path / "two") == 0
+    assert export(form, tmp_path / "two", source=source_of(form)) == 0
     one = {p.relative_to(tmp_path / "a/one"): p for p in (tmp_path / "a/one").rglob("*")}
     two = {p.relative_to(tmp_path / "two"): p for p in (tmp_path / "two").rglob("*")}
     assert set(one) == set(two)
@@ -69,7 +71,7 @@ def test_equal_datasets_yield_equal_files_in_every_format(tmp_path, form):
 def test_a_folder_that_is_not_empty_is_kept(tmp_path, capsys, form):
     (tmp_path / "out").mkdir()
     (tmp_path / "out/mine.txt").write_text("mine")
-    assert export(form, tmp_path / "out") == 1
+    assert export(form, tmp_path / "out", source=source_of(form)) == 1
     assert "the folder is not empty; choose a new one with -o" in capsys.readouterr().err
     assert names_in(tmp_path) == ["out"]
     assert names_in(tmp_path / "out") == ["mine.txt"]
@@ -89,7 +91,9 @@ def test_output_to_a_file_or_into_the_dataset_is_rejected(run, capsys):
         (["--to", "rosbag"], "invalid choice: 'rosbag'"),
         (["--to", "npz", "--merge"], "--merge applies to las, laz, not to npz"),
         (["--to", "tum", "--lidar", "top"], "--lidar applies to"),
-        (["--to", "kitti", "--labels", "map.yaml"], "--labels applies to labels, las, laz"),
+        (["--to", "kitti", "--labels", "map.yaml"], "--labels applies to coco, labels, las"),
+        (["--to", "npz", "--boxes-of", "tree"], "--boxes-of applies to coco"),
+        (["--to", "coco", "--crowd-below-px", "-1"], "-1 must not be negative"),
         (["--to", "tum", "--depth-per-m", "0"], "0 must be above 0"),
         (["--to", "kitti", "--sequence", "100"], "100 must be from 0 to 99"),
         (["--to", "mcap", "--shift-s", "1e10"], "must be within 2^31 s"),
@@ -199,6 +203,7 @@ def test_echoes_of_air_and_false_alarms_are_counted(run, capsys):
         ("npz", ["npz contains only scans", "pulses without an echo are not", "waveforms are not"]),
         ("laz", ["laz contains only scans: images are not exported"]),
         ("mcap", ["points have only the fields of the velodyne layout, and no truth"]),
+        ("coco", ["coco contains only cameras: lidars are not exported"]),
     ],
 )
 def test_data_that_a_format_omits_is_reported_once(run, capsys, form, reported):
@@ -285,9 +290,9 @@ def test_a_full_disk_is_reported_and_leaves_no_files(tmp_path, form):
     """Files are limited to 20 kB, small images to 2 kB; every format needs more."""
     import resource
 
-    most_bytes = 2_000 if form == "tum" else 20_000
+    most_bytes = 2_000 if form in {"tum", "coco"} else 20_000
     done = subprocess.run(
-        [*COMMAND, run_folder(), "--to", form, "-o", tmp_path / "out"],
+        [*COMMAND, source_of(form), "--to", form, "-o", tmp_path / "out"],
         env=environment(),
         capture_output=True,
         text=True,

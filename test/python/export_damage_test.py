@@ -6,13 +6,15 @@ import shutil
 
 import numpy as np
 import pytest
-from export_runs import export, fails, names_in, run_folder
+from detection_runs import FORMS as OF_BOXES
+from detection_runs import copy_of
+from export_runs import export, fails, names_in
 
 
 @pytest.fixture
-def run(tmp_path):
+def run(tmp_path, request):
     """A copy of the dataset that tests may modify."""
-    return shutil.copytree(run_folder(), tmp_path / "run")
+    return copy_of(request, tmp_path / "run")
 
 
 def test_missing_and_broken_datasets_are_reported(run, capsys):
@@ -61,7 +63,7 @@ def test_missing_and_damaged_scans_are_reported(run, capsys, form):
     assert "although dataset.yaml lists it as done; was it removed?" in fails(capsys, run, form)
 
 
-@pytest.mark.parametrize("form", ["kitti", "tum", "mcap"])
+@pytest.mark.parametrize("form", ["kitti", "tum", "mcap", *OF_BOXES])
 def test_missing_and_damaged_images_are_reported(run, capsys, form):
     file = run / "camera/right/000001.png"
     data = file.read_bytes()
@@ -76,12 +78,48 @@ def test_missing_and_damaged_images_are_reported(run, capsys, form):
     assert "must have 96 x 72 pixels" in fails(capsys, run, form)
 
 
-@pytest.mark.parametrize("form", ["kitti", "tum", "mcap"])
+@pytest.mark.parametrize("form", ["kitti", "tum", "mcap", *OF_BOXES])
 def test_a_missing_first_picture_is_reported(run, capsys, form):
     (run / "camera/left/000000.png").unlink()
     line = fails(capsys, run, form, "--camera", "left", "--camera", "right")
     assert "camera/left/000000.png: " in line
     assert "was it removed?" in line
+
+
+@pytest.mark.parametrize("form", OF_BOXES)
+def test_missing_and_damaged_boxes_are_reported(run, capsys, form):
+    file = run / "camera/left/000000_boxes.npy"
+    data = file.read_bytes()
+    begin = data.index(b"\n") + 1
+    rows = np.frombuffer(data, np.load(file).dtype, offset=begin)
+
+    def changed(name, value):
+        spoiled = rows.copy()
+        spoiled[name][0] = value
+        return data[:begin] + spoiled.tobytes()
+
+    for spoiled, rule in (
+        (data[:-1], "its header requires"),
+        (data + b"\0", "its header requires"),
+        (data[:20], "it is not a table of boxes"),
+        (b"", "it is not a table of boxes"),
+        (data[:6] + b"\x09\x00" + data[8:], "it is not a table of boxes"),
+        (data.replace(b"'length_m'", b"'lengthwm'", 1), "it must be a list of rows of instance"),
+        (data.replace(b"False", b"false", 1), "it is not a table of boxes"),
+        (changed("x_m", np.nan), "has invalid values"),
+        (changed("time_s", 1e30), "has invalid values"),
+        (changed("qw", 7), "has invalid values"),
+        (changed("width_m", -1), "has invalid values"),
+        (changed("visible_u_max", 96), "is not inside the image"),
+        (None, "was it removed?"),
+    ):
+        file.unlink()
+        if spoiled is not None:
+            file.write_bytes(spoiled)
+        line = fails(capsys, run, form)
+        assert "camera/left/000000_boxes.npy: " in line
+        assert rule in line
+        file.write_bytes(data)
 
 
 def test_points_with_invalid_coordinates_or_times_are_reported(run, capsys):
@@ -125,7 +163,7 @@ def test_broken_trajectories_are_reported(run, capsys, form):
         assert rule in line
 
 
-@pytest.mark.parametrize("form", ["kitti", "tum", "npz", "mcap"])
+@pytest.mark.parametrize("form", ["kitti", "tum", "npz", "mcap", *OF_BOXES])
 @pytest.mark.parametrize("key", ["focal_px", "centre_px"])
 def test_lenses_without_a_key_are_reported(run, capsys, form, key):
     file = run / "calibration/left.yaml"

@@ -89,6 +89,24 @@ def read_depths_m(dataset: Dataset, camera: Camera, frame: Frame) -> NDArray[np.
     return depths_m
 
 
+def read_labels(
+    dataset: Dataset, camera: Camera, frame: Frame
+) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]:
+    """Reads the labels and the instances of the pixels: height x width each."""
+    file = dataset.image_file(camera, frame, ".exr")
+    channels = read_channels(file)
+    read = []
+    for channel in ("Label", "Instance"):
+        values = channels.get(channel)
+        if values is None or values.shape != camera.size_px[::-1]:
+            rule = f"must have a channel {channel} of the size that its calibration states"
+            raise Error(
+                f"{file}: it {rule}: add truth to its products; or is it from another camera?"
+            )
+        read.append(np.asarray(values, dtype=np.uint32))
+    return read[0], read[1]
+
+
 @contextmanager
 def _quiet_library() -> Iterator[io.StringIO]:
     """Captures standard output, and discards what the library's C code prints to stderr."""

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundray.dataset import Camera, Dataset, Error, Frame, Lidar
-from groundray.export.images import read_channels
+from groundray.export.images import read_channels, read_labels
 from groundray.export.kitti import LabelWriter
 from groundray.export.label_sets import LabelSet
-from groundray.export.labels import LabelMap, Numbers
+from groundray.export.labels import LabelMap
 from groundray.export.notes import Notes
 from groundray.export.scan import read_scan
 
@@ -97,7 +97,7 @@ class _Images:
         return len(images)
 
     def _write_frame(self, frame: Frame, name: str) -> list[dict[str, Any]]:
-        labels, instances = self._read(frame)
+        labels, instances = read_labels(self._dataset, self._camera, frame)
         numbers = self._map.of(labels.ravel()).reshape(labels.shape)
         deep = np.uint8 if max(self._of.names) <= _MOST_OF_8_BITS else np.uint16
         self._png(f"{name}_label.png", numbers.astype(deep))
@@ -122,18 +122,6 @@ class _Images:
             "bbox": [left, top, *size],
             "iscrowd": 0,
         }
-
-    def _read(self, frame: Frame) -> tuple[Numbers, Numbers]:
-        file = self._dataset.image_file(self._camera, frame, ".exr")
-        channels = read_channels(file)
-        read = []
-        for channel in ("Label", "Instance"):
-            values = channels.get(channel)
-            if values is None or values.shape != self._camera.size_px[::-1]:
-                rule = f"must have a channel {channel} of the size that its calibration states"
-                raise Error(f"{file}: it {rule}; is it from another camera?")
-            read.append(np.asarray(values, dtype=np.uint32))
-        return read[0], read[1]
 
     def _png(self, name: str, pixels: NDArray[Any]) -> None:
         import cv2

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from groundray.dataset import Camera, Dataset, Lidar
 
 _OF_SCANS = {"pcd", "las", "laz", "npz"}
-_OF_CAMERAS = {"tum", "denoised"}
+_OF_CAMERAS = {"tum", "denoised", "coco"}
 _PRODUCTS = {
     "_boxes.npy": "boxes are not exported",
     "_no_returns.ply": "tables of pulses without an echo are not exported",
@@ -57,7 +57,7 @@ def tell_of_products(
         notes.tell(f"{form} contains only scans: images are not exported")
     elif form in _OF_CAMERAS and dataset.lidars:
         notes.tell(f"{form} contains only cameras: lidars are not exported")
-    if form in _OF_SCANS or form == "denoised":
+    if form in _OF_SCANS | {"denoised", "coco"}:
         return
     for camera in cameras:
         if any(dataset.image_file(camera, each, ".exr").is_file() for each in camera.frames[:1]):
