@@ -4,7 +4,7 @@ scenes in data/scenes/worlds.
     pip install pillow pyyaml
     python3 docs/pictures/draw_worlds.py build/release/bin out/worlds [SCENE …]
 
-The pictures are the cameras' own, with 8 to 32 paths a pixel: two to eight minutes of two cores
+The pictures are the cameras' own, with 16 paths a pixel: two to five minutes of two cores
 each. With names of scenes, only these are made anew, if out/worlds has the others.
 """
 
@@ -20,7 +20,7 @@ SCENES = (
     *("meadow", "forest_track", "gravel_pit", "desert_wash", "moor", "vineyard"),
     *("alpine_path", "river_bank", "burnt_forest", "tundra", "plantation", "stone_quarry"),
 )
-SAMPLING = {"samples": 8, "most_samples": 32, "relative_error": 0.15}
+SAMPLING = {"samples": 16, "most_samples": 16}
 COLUMNS, WIDTH, GAP = 3, 400, 6
 
 
