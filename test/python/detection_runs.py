@@ -9,7 +9,10 @@ from pathlib import Path
 
 import numpy as np
 import OpenEXR
+import yaml
 from export_runs import PROGRAM, ROOT, run_folder
+from plyfile import PlyData
+from scipy.spatial.transform import Rotation, Slerp
 
 CAMERA = """\
 groundray_camera: 1
@@ -74,7 +77,7 @@ cameras:
 stereo:
   - {{name: pair, left: left, right: right, images: rectified}}
 """
-FORMS = ["coco"]
+FORMS = ["coco", "kitti-object"]
 
 
 @functools.cache
@@ -120,11 +123,109 @@ def instances_of(camera: str, frame: int) -> np.ndarray:
         return image.channels()["Instance"].pixels.astype(int)
 
 
+@functools.cache
+def stamps_s(sensor: str) -> list[float]:
+    """Returns the stamps of a sensor's frames."""
+    record = yaml.safe_load((boxed_folder() / "dataset.yaml").read_text())
+    return [each["stamp_s"] for each in record["frames"] if each["sensor"] == sensor]
+
+
+@functools.cache
+def calibration(sensor: str) -> dict:
+    return yaml.safe_load((boxed_folder() / f"calibration/{sensor}.yaml").read_text())
+
+
+def matrix(rotation: Rotation, place_m) -> np.ndarray:
+    """Returns a pose as a 4 x 4 matrix."""
+    X = np.eye(4)
+    X[:3, :3], X[:3, 3] = rotation.as_matrix(), place_m
+    return X
+
+
+def mount_of(sensor: str) -> np.ndarray:
+    """Returns the pose of a sensor in the body, by SciPy."""
+    said = calibration(sensor)
+    said = said.get("X_BC") or said["X_BS"]
+    return matrix(Rotation.from_quat(said["rotation_xyzw"]), said["translation_m"])
+
+
+@functools.cache
+def path_of(sensor: str) -> tuple[np.ndarray, Slerp]:
+    table = np.loadtxt(boxed_folder() / f"poses/{sensor}.tum")
+    return table, Slerp(table[:, 0], Rotation.from_quat(table[:, 4:]))
+
+
+def pose_of(sensor: str, time_s: float) -> np.ndarray:
+    """Returns the pose of a sensor in D, by slerp and linear interpolation."""
+    table, turn = path_of(sensor)
+    place_m = [np.interp(time_s, table[:, 0], table[:, i]) for i in (1, 2, 3)]
+    return matrix(turn(time_s), place_m)
+
+
+def pinhole_of(camera: str) -> np.ndarray:
+    (f_u, f_v), (c_u, c_v) = (
+        calibration(camera)["lens"]["pinhole"][name] for name in ("focal_px", "centre_px")
+    )
+    return np.array([[f_u, 0, c_u], [0, f_v, c_v], [0, 0, 1]])
+
+
+def pose_of_box(box, after_s: float) -> np.ndarray:
+    """Returns the pose of a row of a table in D, `after_s` later than its frame's stamp."""
+    turn = Rotation.from_quat([box[name] for name in ("qx", "qy", "qz", "qw")])
+    passed_s = after_s - box["time_s"]
+    return matrix(turn, [box[f"{k}_m"] + passed_s * box[f"v{k}_m_s"] for k in "xyz"])
+
+
+def half_of_box(box) -> np.ndarray:
+    return np.array([box["length_m"], box["width_m"], box["height_m"]]) / 2
+
+
+def speed(box) -> float:
+    return float(np.linalg.norm([box[f"v{k}_m_s"] for k in "xyz"]))
+
+
+# In front or behind, left or right, above or below: in the axes of the object.
+SIGNS = np.array([[x, y, z] for x in (1, -1) for y in (1, -1) for z in (1, -1)])
+
+
+def corners_of_box(box, after_s: float) -> np.ndarray:
+    """Returns the 8 corners in D, in the order of SIGNS."""
+    X_DO = pose_of_box(box, after_s)
+    return SIGNS * half_of_box(box) @ X_DO[:3, :3].T + X_DO[:3, 3]
+
+
+def moved(X, points) -> np.ndarray:
+    return points @ X[:3, :3].T + X[:3, 3]
+
+
+def projected(K, points) -> np.ndarray:
+    in_image = points @ K.T
+    return in_image[:, :2] / in_image[:, 2:]
+
+
+def scan_of(lidar: str, frame: int) -> np.ndarray:
+    """Returns the rows of a scan, by plyfile."""
+    return PlyData.read(boxed_folder() / f"lidar/{lidar}/{frame:06}.ply")["vertex"].data
+
+
 __all__ = [
     "FORMS",
+    "SIGNS",
     "boxed_folder",
     "boxes_of",
+    "calibration",
     "copy_of",
+    "corners_of_box",
+    "half_of_box",
     "instances_of",
+    "mount_of",
+    "moved",
+    "pinhole_of",
+    "pose_of",
+    "pose_of_box",
+    "projected",
+    "scan_of",
     "source_of",
+    "speed",
+    "stamps_s",
 ]

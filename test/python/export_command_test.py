@@ -93,6 +93,7 @@ def test_output_to_a_file_or_into_the_dataset_is_rejected(run, capsys):
         (["--to", "tum", "--lidar", "top"], "--lidar applies to"),
         (["--to", "kitti", "--labels", "map.yaml"], "--labels applies to coco, labels, las"),
         (["--to", "npz", "--boxes-of", "tree"], "--boxes-of applies to coco"),
+        (["--to", "kitti-object", "--split", "50,60,-10"], "must be three percentages with the"),
         (["--to", "coco", "--crowd-below-px", "-1"], "-1 must not be negative"),
         (["--to", "tum", "--depth-per-m", "0"], "0 must be above 0"),
         (["--to", "kitti", "--sequence", "100"], "100 must be from 0 to 99"),
@@ -203,6 +204,15 @@ def test_echoes_of_air_and_false_alarms_are_counted(run, capsys):
         ("npz", ["npz contains only scans", "pulses without an echo are not", "waveforms are not"]),
         ("laz", ["laz contains only scans: images are not exported"]),
         ("mcap", ["points have only the fields of the velodyne layout, and no truth"]),
+        (
+            "kitti-object",
+            [
+                "points have only x, y, z and intensity",
+                "waveforms are not",
+                "images are exported as pictures only",
+                "here top: front is left out",
+            ],
+        ),
         ("coco", ["coco contains only cameras: lidars are not exported"]),
     ],
 )

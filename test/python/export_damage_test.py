@@ -10,6 +10,8 @@ from detection_runs import FORMS as OF_BOXES
 from detection_runs import copy_of
 from export_runs import export, fails, names_in
 
+OF_SCANS_TOO = [form for form in OF_BOXES if form != "coco"]
+
 
 @pytest.fixture
 def run(tmp_path, request):
@@ -43,8 +45,9 @@ def test_pipes_are_rejected(run, capsys, name):
     assert name in fails(capsys, run, "npz")
 
 
-@pytest.mark.parametrize("form", ["kitti", "npz", "mcap", "laz"])
+@pytest.mark.parametrize("form", ["kitti", "npz", "mcap", "laz", *OF_SCANS_TOO])
 def test_missing_and_damaged_scans_are_reported(run, capsys, form):
+    options = ["--lidar", "front"]
     file = run / "lidar/front/000001.ply"
     data = file.read_bytes()
     for spoiled, rule in (
@@ -56,11 +59,13 @@ def test_missing_and_damaged_scans_are_reported(run, capsys, form):
         (b"", "is it damaged?"),
     ):
         file.write_bytes(spoiled)
-        line = fails(capsys, run, form)
+        line = fails(capsys, run, form, *options)
         assert "lidar/front/000001.ply: " in line
         assert rule in line
     file.unlink()
-    assert "although dataset.yaml lists it as done; was it removed?" in fails(capsys, run, form)
+    assert "although dataset.yaml lists it as done; was it removed?" in fails(
+        capsys, run, form, *options
+    )
 
 
 @pytest.mark.parametrize("form", ["kitti", "tum", "mcap", *OF_BOXES])
@@ -143,7 +148,7 @@ def test_missing_and_damaged_depths_are_reported(run, capsys):
         assert "camera/eye/000001.exr: " in fails(capsys, run, "tum", "--camera", "eye")
 
 
-@pytest.mark.parametrize("form", ["kitti", "pcd", "npz", "las", "mcap"])
+@pytest.mark.parametrize("form", ["kitti", "pcd", "npz", "las", "mcap", *OF_SCANS_TOO])
 def test_broken_trajectories_are_reported(run, capsys, form):
     file = run / "poses/top.tum"
     lines = file.read_text().splitlines()
@@ -176,7 +181,7 @@ def test_lenses_without_a_key_are_reported(run, capsys, form, key):
 ABSURD = ["inf", "-inf", "nan", "1e30", "-1e30", "1e999999999", "5000000000", "soon"]
 
 
-@pytest.mark.parametrize("form", ["kitti", "tum", "npz", "laz", "mcap"])
+@pytest.mark.parametrize("form", ["kitti", "tum", "npz", "laz", "mcap", *OF_SCANS_TOO])
 @pytest.mark.parametrize("time", ABSURD)
 def test_times_out_of_range_are_reported(run, capsys, form, time):
     """Stamps, the origin, lines of paths, and exposures."""
@@ -211,11 +216,14 @@ def test_a_scan_long_after_its_trajectory_is_reported(run, capsys, form):
     assert "the path ends at 0." in line
 
 
-def test_random_damage_causes_one_error_or_none(run, capsys):
+@pytest.mark.parametrize("form", ["mcap", "kitti", *OF_BOXES])
+def test_random_damage_causes_one_error_or_none(run, capsys, form):
     """Random bits are flipped and ends cut, in everything except pixels and points."""
     random = np.random.default_rng(3)
     files = ["dataset.yaml", "poses/front.tum", "calibration/front.yaml", "calibration/left.yaml"]
     files += ["calibration/left.ros.yaml", "lidar/front/000000.ply"]
+    files += ["camera/left/000000_boxes.npy"] if form in OF_BOXES else []
+    options = ["--camera", "left"] if form == "coco" else ["--lidar", "front"]
     for name in files:
         data = (run / name).read_bytes()
         for trial in range(8):
@@ -226,13 +234,10 @@ def test_random_damage_causes_one_error_or_none(run, capsys):
                 for place in random.integers(min(len(spoiled), 2000), size=3):
                     spoiled[place] ^= 1 << random.integers(8)
             (run / name).write_bytes(spoiled)
-            for form in ("mcap", "kitti"):
-                code = export(form, run.parent / "out", "--lidar", "front", source=run)
-                reported = capsys.readouterr().err
-                assert (code == 0 and not reported) or (code == 1 and reported.count("\n") >= 1), (
-                    name
-                )
-                assert "Traceback" not in reported
-                shutil.rmtree(run.parent / "out", ignore_errors=True)
-                assert names_in(run.parent) == ["run"]
+            code = export(form, run.parent / "out", *options, source=run)
+            reported = capsys.readouterr().err
+            assert (code == 0 and not reported) or (code == 1 and reported.count("\n") >= 1), name
+            assert "Traceback" not in reported
+            shutil.rmtree(run.parent / "out", ignore_errors=True)
+            assert names_in(run.parent) == ["run"]
         (run / name).write_bytes(data)

@@ -134,7 +134,7 @@ def _read_table(file: Path, fields: dict[str, str]) -> NDArray[Any]:
         if np.lib.format.read_magic(stream) != (1, 0):
             raise ValueError("it is not version 1.0 of NPY")
         shape, _, dtype = np.lib.format.read_array_header_1_0(stream)
-    except (ValueError, TypeError, SyntaxError, UnicodeDecodeError) as fault:
+    except Exception as fault:  # whatever NumPy raises for a damaged header
         reason = " ".join(str(fault).split())
         raise Error(f"{file}: it is not a table of boxes: {reason}: {_DAMAGED}") from None
     if dtype != np.dtype(list(fields.items())) or len(shape) != 1:

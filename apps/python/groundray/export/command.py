@@ -11,7 +11,17 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from groundray.dataset import Camera, Dataset, Error, Lidar
-from groundray.export import clouds, coco, denoised, kitti, label_images, las, ros_bag, tum
+from groundray.export import (
+    clouds,
+    coco,
+    denoised,
+    kitti,
+    kitti_object,
+    label_images,
+    las,
+    ros_bag,
+    tum,
+)
 from groundray.export.boxes import BoxChoice
 from groundray.export.categories import Categories
 from groundray.export.label_sets import LabelSet, find_set
@@ -93,6 +103,10 @@ def _export(options: argparse.Namespace, out: Path, dataset: Dataset, notes: Not
         with_polygons, least_px = options.segmentation != "rle", options.crowd_below_px or 0
         masks = coco.CocoOptions(categories, choice, with_polygons, least_px)
         return coco.write_coco(dataset, cameras, masks, out, notes)
+    if options.to == "kitti-object":
+        choice, split = BoxChoice(dataset, options.boxes_of), options.split or (100, 0, 0)
+        objects = kitti_object.KittiObjectOptions(full_scale, choice, split)
+        return kitti_object.write_kitti_object(dataset, lidars, cameras, objects, out, notes)
     if options.to == "labels":
         chosen = _set_of(options)
         if chosen is None:

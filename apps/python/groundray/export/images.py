@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundray.dataset import Camera, Dataset, Error, Frame, read_listed
+from groundray.export.sensor_path import Floats
 
 _GREY, _COLOUR = 0, 2  # colour types of PNG
 
@@ -38,6 +39,21 @@ def has_depths(dataset: Dataset, camera: Camera) -> bool:
     files = (dataset.image_file(camera, frame, ".exr") for frame in camera.frames)
     first = next((file for file in files if file.is_file()), None)
     return first is not None and "Z" in read_channels(first, only_names=True)
+
+
+def pinhole_of(dataset: Dataset, camera: Camera, form: str, otherwise: str) -> Floats:
+    """Returns K of a camera with pictures: 3 x 3, px.
+
+    Raises Error, with `otherwise` added to the remedy, if it has none or is not a pinhole.
+    """
+    if camera.frames and not has_pictures(dataset, camera):
+        rule = f"camera {camera.name} has no pictures"
+        raise Error(f"{dataset.folder}: {rule}; add picture to its products{otherwise}")
+    if camera.pinhole_matrix is None:
+        rule = f"camera {camera.name} has the lens {camera.lens_model}, but {form} needs pinholes"
+        fix = "use a pinhole, or set images: rectified for its pair"
+        raise Error(f"{dataset.folder}: {rule}; {fix}{otherwise}")
+    return camera.pinhole_matrix
 
 
 def read_picture(dataset: Dataset, camera: Camera, frame: Frame) -> Picture:

@@ -10,11 +10,14 @@ import numpy as np
 
 from groundray.dataset import Camera, Dataset, Error, Frame, Lidar
 from groundray.export.clouds import tell_of_scan
-from groundray.export.images import has_pictures, read_picture
+from groundray.export.images import Picture, pinhole_of, read_picture
 from groundray.export.labels import Instances, LabelMap
 from groundray.export.notes import Notes
 from groundray.export.scan import FullScale, Scan, read_scan
 from groundray.export.sensor_path import Floats, SensorPath
+
+NO_IMAGES = ", or export with --no-images"
+"""Remedy of faults of cameras, if the format does without them."""
 
 
 @dataclass(frozen=True)
@@ -27,7 +30,7 @@ class KittiOptions:
 
 
 @dataclass(frozen=True)
-class _View:
+class KittiView:
     """Replacement of KITTI's four cameras: a left one, and a right one if there is a pair."""
 
     left: Camera | None
@@ -43,7 +46,9 @@ _X_SC = np.array([[0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 0, 1]], dty
 
 
 @dataclass(frozen=True)
-class _KittiFrame:
+class KittiFrame:
+    """A scan and its image, at one time."""
+
     time_ns: int  # of the pose, and of the frame of the points
     scan: Frame
     image: Frame | None
@@ -58,21 +63,24 @@ def write_kitti(
     notes: Notes,
 ) -> str:
     """Writes the sequences of these lidars, with the pictures of a camera or a rectified pair."""
-    view = _view_of(dataset, cameras, notes)
+    view = view_of(dataset, cameras, NO_IMAGES, notes)
     notes.tell(
         "points are relative to the pose at their frame's time; moving objects are not corrected"
     )
     counts = []
     for i, lidar in enumerate(lidars):
         number = options.first_sequence + i
-        frames = _frames_of(lidar, view, notes)
+        frames = frames_of(lidar, view, NO_IMAGES, notes)
         _Sequence(dataset, lidar, view, frames, options, out, number, notes).write()
         counts.append(f"sequence {number:02} of {lidar.name}: {len(frames)} frames")
     return "; ".join(counts)
 
 
-def _view_of(dataset: Dataset, cameras: Sequence[Camera], notes: Notes) -> _View:
-    """Returns the selected or only camera, else the first rectified pair."""
+def view_of(dataset: Dataset, cameras: Sequence[Camera], otherwise: str, notes: Notes) -> KittiView:
+    """Returns the selected or only camera, else the first rectified pair.
+
+    `otherwise` is added to the remedies of errors.
+    """
     names = {camera.name: camera for camera in cameras}
     chosen = (each for each in dataset.pairs if {each.left, each.right} <= set(names))
     pair = next((each for each in chosen if each.is_rectified), None)
@@ -81,18 +89,16 @@ def _view_of(dataset: Dataset, cameras: Sequence[Camera], notes: Notes) -> _View
             "without a camera, camera 0 stands at the lidar, looks along its x and has P = [I | 0]"
         )
         ahead = np.hstack([np.eye(3), np.zeros((3, 1))])
-        return _View(None, None, (ahead, ahead))
+        return KittiView(None, None, (ahead, ahead))
     if pair is None and len(cameras) > 1:
         rule = f"it has the cameras {', '.join(names)} and no rectified pair among them"
-        raise Error(
-            f"{dataset.folder}: {rule}; choose one with --camera, or export none with --no-images"
-        )
+        raise Error(f"{dataset.folder}: {rule}; choose one with --camera{otherwise}")
     left = names[pair.left] if pair else cameras[0]
     right = names[pair.right] if pair else None
-    P_left = np.hstack([_pinhole(dataset, left), np.zeros((3, 1))])
+    P_left = np.hstack([pinhole_of(dataset, left, "KITTI", otherwise), np.zeros((3, 1))])
     if right is None:
         notes.tell(f"camera {left.name} replaces all four of KITTI's: P0 to P3 are equal")
-        return _View(left, None, (P_left, P_left))
+        return KittiView(left, None, (P_left, P_left))
     left_out = [name for name in names if name not in (left.name, right.name)]
     if left_out:
         notes.tell(f"KITTI has one pair of cameras: {', '.join(left_out)} not exported")
@@ -100,47 +106,34 @@ def _view_of(dataset: Dataset, cameras: Sequence[Camera], notes: Notes) -> _View
     if np.abs(X_RL[:3, :3] - np.eye(3)).max() > 1e-9:
         rule = f"cameras {left.name} and {right.name} are not parallel"
         raise Error(f"{dataset.folder}: {rule}; set images: rectified for their pair")
-    K_right = _pinhole(dataset, right)
-    return _View(left, right, (P_left, K_right @ X_RL[:3]))
+    K_right = pinhole_of(dataset, right, "KITTI", otherwise)
+    return KittiView(left, right, (P_left, K_right @ X_RL[:3]))
 
 
-def _pinhole(dataset: Dataset, camera: Camera) -> Floats:
-    if camera.frames and not has_pictures(dataset, camera):
-        rule = f"camera {camera.name} has no pictures"
-        fix = "add picture to its products, or export with --no-images"
-        raise Error(f"{dataset.folder}: {rule}; {fix}")
-    K = camera.pinhole_matrix
-    if K is None:
-        rule = f"camera {camera.name} has the lens {camera.lens_model}, but KITTI needs pinholes"
-        fix = "use a pinhole, set images: rectified for its pair, or export with --no-images"
-        raise Error(f"{dataset.folder}: {rule}; {fix}")
-    return K
-
-
-def _frames_of(lidar: Lidar, view: _View, notes: Notes) -> list[_KittiFrame]:
+def frames_of(lidar: Lidar, view: KittiView, otherwise: str, notes: Notes) -> list[KittiFrame]:
     """Returns a frame for each scan; with images, for each image that has a scan of its own.
 
     The scan of an image is the last one begun by the middle of its exposure, else the first.
+    `otherwise` is added to the remedies of errors.
     """
     if not lidar.frames:
         raise Error(f"lidar {lidar.name}: it has no finished scan; generate one first")
     if view.left is None:
-        return [_KittiFrame(each.stamp_ns, each, None) for each in lidar.frames]
+        return [KittiFrame(each.stamp_ns, each, None) for each in lidar.frames]
     if not view.left.frames:
         rule = f"camera {view.left.name}: it has no finished image"
-        raise Error(f"{rule}; generate one, or give --no-images")
+        raise Error(f"{rule}; generate one{otherwise}")
     stamps = np.array([each.stamp_ns for each in lidar.frames])
-    frames: list[_KittiFrame] = []
+    frames: list[KittiFrame] = []
     for image in view.left.frames:
         time_ns = image.stamp_ns + view.left.middle_ns
         i = max(int(np.searchsorted(stamps, time_ns, side="right")) - 1, 0)
         if frames and frames[-1].scan == lidar.frames[i]:
             notes.count("{} images are skipped: another image has their scan", 1)
         else:
-            frames.append(_KittiFrame(time_ns, lidar.frames[i], image))
-    sentence = (
-        "{} scans of " + lidar.name + " are skipped: they have no image; --no-images exports all"
-    )
+            frames.append(KittiFrame(time_ns, lidar.frames[i], image))
+    sentence = "{} scans of " + lidar.name + " are skipped: they have no image"
+    sentence += "; --no-images exports all" if otherwise else ""
     notes.count(sentence, len(lidar.frames) - len(frames))
     return frames
 
@@ -151,8 +144,8 @@ class _Sequence:
 
     dataset: Dataset
     lidar: Lidar
-    view: _View
-    frames: Sequence[_KittiFrame]
+    view: KittiView
+    frames: Sequence[KittiFrame]
     options: KittiOptions
     out: Path
     number: int
@@ -173,7 +166,8 @@ class _Sequence:
             labels = LabelWriter(self.dataset, self.options.labels, folder / "labels")
         for i, each in enumerate(self.frames):
             scan = read_scan(self.dataset, self.lidar, each.scan)
-            self._write_points(scan, path, each.time_ns, folder / f"velodyne/{i:06}.bin")
+            points = velodyne_bytes(scan, path, each.time_ns, self.options.full_scale)
+            (folder / f"velodyne/{i:06}.bin").write_bytes(points)
             if labels:
                 labels.write(scan, i)
             else:
@@ -192,40 +186,50 @@ class _Sequence:
         if not self.options.labels:
             file = self.out / "poses" / f"{self.number:02}.txt"
             file.parent.mkdir(exist_ok=True)
-        file.write_text("".join(_numbers(pose[:3]) + "\n" for pose in poses))
+        file.write_text("".join(numbers_text(pose[:3]) + "\n" for pose in poses))
 
     def _write_calibration(self, file: Path) -> None:
         P_left, P_right = self.view.matrices
         lines = {"P0": P_left, "P1": P_right, "P2": P_left, "P3": P_right}
         lines["Tr"] = (np.linalg.inv(self.view.X_BC(self.lidar)) @ self.lidar.X_BS)[:3]
-        file.write_text("".join(f"{name}: {_numbers(matrix)}\n" for name, matrix in lines.items()))
-
-    def _write_points(self, scan: Scan, path: SensorPath, time_ns: int, file: Path) -> None:
-        rows = np.empty((len(scan), 4), "<f4")
-        rows[:, :3] = scan.points_at_m(path, time_ns)
-        rows[:, 3] = self.options.full_scale.shares(scan.lidar, scan.rows)
-        file.write_bytes(rows.tobytes())
+        file.write_text(
+            "".join(f"{name}: {numbers_text(matrix)}\n" for name, matrix in lines.items())
+        )
 
     def _write_pictures(self, image: Frame, folder: Path, name: str) -> None:
-        for side, camera in enumerate((self.view.left, self.view.right)):
-            if camera is None:
-                continue
-            frame = next((each for each in camera.frames if each.number == image.number), None)
-            if frame is None:
-                rule = f"it has no image {image.number}, but the other camera of its pair has"
-                raise Error(f"camera {camera.name}: {rule}; generate it")
-            picture = read_picture(self.dataset, camera, frame)
-            if picture.bits == 16:
-                self.notes.tell(
-                    "pictures have 16 bits, but KITTI's have 8: some programs read only the upper 8"
-                )
+        for side, picture in enumerate(pictures_of(self.dataset, self.view, image, self.notes)):
             # KITTI's cameras 0 and 1 are grey, 2 and 3 have colours.
             images = folder / f"image_{side + (2 if picture.is_colour else 0)}"
             images.mkdir(exist_ok=True)
             (images / name).write_bytes(picture.data)
 
 
-def _numbers(matrix: Floats) -> str:
+def velodyne_bytes(scan: Scan, path: SensorPath, time_ns: int, full_scale: FullScale) -> bytes:
+    """Returns the points in S at one time, with intensities as shares of full scale."""
+    rows = np.empty((len(scan), 4), "<f4")
+    rows[:, :3] = scan.points_at_m(path, time_ns)
+    rows[:, 3] = full_scale.shares(scan.lidar, scan.rows)
+    return rows.tobytes()
+
+
+def pictures_of(dataset: Dataset, view: KittiView, image: Frame, notes: Notes) -> list[Picture]:
+    """Reads the picture of the left camera, and of the right one if there is one."""
+    pictures = []
+    for camera in (view.left, view.right):
+        if camera is None:
+            continue
+        frame = next((each for each in camera.frames if each.number == image.number), None)
+        if frame is None:
+            rule = f"it has no image {image.number}, but the other camera of its pair has"
+            raise Error(f"camera {camera.name}: {rule}; generate it")
+        pictures.append(read_picture(dataset, camera, frame))
+    if any(picture.bits == 16 for picture in pictures):
+        notes.tell("pictures have 16 bits, but KITTI's have 8: some programs read only the upper 8")
+    return pictures
+
+
+def numbers_text(matrix: Floats) -> str:
+    """Returns the elements by rows, as KITTI's files have them."""
     return " ".join(f"{value:.16e}" for value in matrix.ravel())
 
 

@@ -8,6 +8,7 @@ from groundray.dataset import Camera, Dataset, Lidar
 
 _OF_SCANS = {"pcd", "las", "laz", "npz"}
 _OF_CAMERAS = {"tum", "denoised", "coco"}
+_WITH_BOXES = {"kitti-object"}
 _PRODUCTS = {
     "_boxes.npy": "boxes are not exported",
     "_no_returns.ply": "tables of pulses without an echo are not exported",
@@ -37,7 +38,7 @@ class Notes:
 
 def tell_of_columns(form: str, layout: str, notes: Notes) -> None:
     """Notes which columns the points of a format lack. `layout` is that of a bag's points."""
-    if form == "kitti":
+    if form in ("kitti", "kitti-object"):
         notes.tell("points have only x, y, z and intensity: no times, rings, returns or truth")
     elif form == "semantic-kitti":
         notes.tell("labels and instances are the only truth of points; no times, rings or returns")
@@ -51,6 +52,8 @@ def tell_of_products(
     """Notes which files of the sensors are not exported."""
     for lidar in lidars if form not in _OF_CAMERAS else ():
         for suffix, sentence in _PRODUCTS.items():
+            if suffix == "_boxes.npy" and form in _WITH_BOXES:
+                continue
             if any(dataset.scan_file(lidar, each, suffix).is_file() for each in lidar.frames[:1]):
                 notes.tell(sentence)
     if form in _OF_SCANS and dataset.cameras:

@@ -19,21 +19,23 @@ FORMS = (
     "denoised",
     "labels",
     "coco",
+    "kitti-object",
 )
 KITTI, LAS = {"kitti", "semantic-kitti"}, {"las", "laz"}
 OF_CAMERAS = {"tum", "denoised", "coco"}  # without scans
-_BOXED = {"coco"}
+_BOXED = {"coco", "kitti-object"}
 # Formats that an option applies to; options not listed apply to all.
 _ONLY_OF = {
     "lidar": set(FORMS) - OF_CAMERAS,
-    "camera": KITTI | {"mcap", "labels"} | OF_CAMERAS,
+    "camera": KITTI | {"kitti-object", "mcap", "labels"} | OF_CAMERAS,
     "no_images": KITTI | {"mcap"},
-    "intensity_full_scale": KITTI | LAS | {"mcap"},
+    "intensity_full_scale": KITTI | LAS | {"kitti-object", "mcap"},
     "sequence": KITTI,
     "labels": {"semantic-kitti", "labels", "coco"} | LAS,
     "boxes_of": _BOXED,
     "segmentation": {"coco"},
     "crowd_below_px": {"coco"},
+    "split": {"kitti-object"},
     "depth_per_m": {"tum"},
     "columns": {"pcd"},
     "frame": {"pcd"},
@@ -130,6 +132,8 @@ def _add_boxes(group: argparse._ArgumentGroup) -> None:
     add("--segmentation", choices=("polygon", "rle"), help=text)
     text = "join instances of fewer visible pixels to crowds of COCO (default: 0)"
     add("--crowd-below-px", type=_count, metavar="N", help=text)
+    text = "percentages of KITTI's frames for train, val and test (default: 100,0,0)"
+    add("--split", type=_percentages, metavar="A,B,C", help=text)
 
 
 def _add_others(group: argparse._ArgumentGroup) -> None:
@@ -158,6 +162,13 @@ def _count(text: str) -> int:
     if value < 0:
         raise argparse.ArgumentTypeError(f"{text} must not be negative")
     return value
+
+
+def _percentages(text: str) -> tuple[int, int, int]:
+    parts = [int(part) for part in text.split(",")]
+    if len(parts) != 3 or min(parts) < 0 or sum(parts) != 100:
+        raise argparse.ArgumentTypeError(f"{text} must be three percentages with the sum 100")
+    return parts[0], parts[1], parts[2]
 
 
 def _whole(text: str) -> int:
