@@ -32,6 +32,8 @@ void add_run_commands(CLI::App& app, std::vector<Command>& commands);
 Command add_sample_command(CLI::App& app);
 /// Adds `traversability` to the program: layers of the ground for a vehicle.
 Command add_traversability_command(CLI::App& app);
+/// Adds `voxels` to the program: occupied and visible voxels around lidars.
+Command add_voxels_command(CLI::App& app);
 /// Adds `list` to the program: the presets, materials and assets that a scene file can name.
 Command add_list_command(CLI::App& app);
 /// Adds `terrain` to the program: meshes, certificates and fills of DEMs.

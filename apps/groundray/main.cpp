@@ -26,9 +26,10 @@ constexpr int failed = 1;
 constexpr int interrupted = 130;
 
 // Commands by task, for help.
-constexpr std::array<std::pair<const char*, const char*>, 9> tasks{
+constexpr std::array<std::pair<const char*, const char*>, 10> tasks{
     {{"generate", "Simulate sensors"},
      {"sample", "Simulate sensors"},
+     {"voxels", "Simulate sensors"},
      {"verify", "Simulate sensors"},
      {"merge", "Simulate sensors"},
      {"info", "Look at files and data"},
@@ -43,7 +44,6 @@ int run(int argc, char** argv) {
       "with ground truth, the true position, range and normal of every point and pixel.",
       "groundray");
   app.footer(
-      "What a scene names:  groundray list\n"
       "A first run:         groundray generate data/scenes/first_light.yaml -o out/first_light\n"
       "Its result:          groundray info out/first_light\n"
       "Exit codes:          0 done, 1 failed, 2 wrong usage, 130 interrupted (--resume continues)\n"
@@ -54,6 +54,7 @@ int run(int argc, char** argv) {
   std::vector<groundray::Command> commands;
   groundray::add_run_commands(app, commands);
   commands.push_back(groundray::add_sample_command(app));
+  commands.push_back(groundray::add_voxels_command(app));
 
   std::filesystem::path file;
   auto* info = app.add_subcommand("info", "Describe a file, a dataset or a preset");

@@ -1,5 +1,4 @@
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <array>
@@ -8,13 +7,12 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
-#include <span>
 #include <string>
-#include <system_error>
 #include <vector>
 
 #include "apps/groundray/command.h"
 #include "apps/groundray/progress_stage.h"
+#include "apps/groundray/whole_folder.h"
 #include "apps/scan/number_checks.h"
 #include "apps/scene/readers/scene_reader.h"
 #include "apps/scene/scene_place.h"
@@ -30,45 +28,6 @@ namespace groundray {
 namespace {
 
 namespace fs = std::filesystem;
-
-// Folder that appears with all its files, or not at all.
-class WholeFolder {
- public:
-  // @throws Error if the folder has files already, or cannot be made.
-  explicit WholeFolder(fs::path path) : path_(std::move(path)) {
-    std::error_code fault;
-    if (path_.filename().empty()) path_ = path_.parent_path();
-    if (fs::exists(path_, fault) &&
-        (!fs::is_directory(path_, fault) || !fs::is_empty(path_, fault)))
-      throw Error("{}: exists and is not an empty folder; choose another name", path_.string());
-    fs::path name = ".";
-    name += path_.filename();
-    name += fmt::format(".{}.part", getpid());
-    aside_ = path_.parent_path() / name;
-    if (!fs::create_directory(aside_, fault) || fault)
-      throw Error("{}: cannot be made: {}", path_.string(),
-                  fault ? fault.message() : aside_.string() + " exists");
-  }
-  ~WholeFolder() {
-    std::error_code ignored;
-    if (!aside_.empty()) fs::remove_all(aside_, ignored);
-  }
-  WholeFolder(const WholeFolder&) = delete;
-  WholeFolder& operator=(const WholeFolder&) = delete;
-
-  fs::path file(const char* name) const { return aside_ / name; }
-
-  void appear() {
-    std::error_code fault;
-    fs::rename(aside_, path_, fault);
-    if (fault) throw Error("{}: cannot be written: {}", path_.string(), fault.message());
-    aside_.clear();
-    print_text(stdout, "written to {}\n", path_.string());
-  }
-
- private:
-  fs::path path_, aside_;
-};
 
 std::string bound_text(const std::optional<double>& bound) {
   return bound ? fmt::format("{}", *bound) : "null";
@@ -232,8 +191,7 @@ Command add_traversability_command(CLI::App& app) {
   const auto options = std::make_shared<TraversabilityOptions>();
   CLI::App* command = app.add_subcommand(
       "traversability",
-      "Write elevation, slope, roughness, steps, clearance and traversability of the ground for a "
-      "vehicle, as GeoTIFFs");
+      "Write slope, roughness, steps and clearance of ground for a vehicle, and its verdict");
   options->add_input(command);
   options->add_vehicle(command);
   options->add_limits(command);

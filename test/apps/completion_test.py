@@ -22,7 +22,7 @@ PROGRAMS = [
 COMMANDS = {
     "groundray": [
         *("generate", "sample", "verify", "merge", "info", "list", "terrain", "reconstruct"),
-        "traversability",
+        *("traversability", "voxels"),
         *(f"terrain {what}" for what in ("mesh", "certify", "fill")),
         *(f"reconstruct {what}" for what in ("mesh", "simplify", "fill", "dem")),
     ],
@@ -78,7 +78,7 @@ printf '%s\\n' "${{COMPREPLY[@]}}"
             "groundray ",
             {
                 *("generate", "sample", "verify", "merge", "info", "list", "terrain"),
-                *("traversability", "reconstruct"),
+                *("traversability", "voxels", "reconstruct"),
             },
         ),
         ("groundray ge", {"generate"}),

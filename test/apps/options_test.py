@@ -10,7 +10,7 @@ from markdown_page import PAGES, ROOT, Page, name_of
 PROGRAMS = ROOT / "build/release/bin"
 COMMANDS = {
     "groundray": [
-        *("generate", "sample", "verify", "merge", "info", "list", "traversability"),
+        *("generate", "sample", "voxels", "verify", "merge", "info", "list", "traversability"),
         *(f"terrain {what}" for what in ("mesh", "certify", "fill")),
         *(f"reconstruct {what}" for what in ("mesh", "simplify", "fill", "dem")),
     ],

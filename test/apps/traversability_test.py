@@ -155,7 +155,7 @@ def test_belly_touches_a_ridge_as_high_as_the_clearance(tmp_path):
         assert ours["verdict"][20, 20] == 8 * contact
 
 
-def test_bytes_do_not_depend_on_the_number_of_threads(hills, tmp_path):
+def test_layers_have_the_same_bytes_for_any_number_of_threads(hills, tmp_path):
     for threads in (1, 3):
         result = layers(hills, tmp_path / f"{threads}", "--threads", threads)
         assert result.returncode == 0, result.stderr
@@ -203,7 +203,7 @@ def test_mistakes_in_the_vehicle_are_reported(hills, tmp_path, more, words):
     assert not [path for path in tmp_path.iterdir() if "out" in path.name]
 
 
-def test_other_mistakes_are_reported(hills, tmp_path):
+def test_mistakes_in_files_of_traversability_are_reported(hills, tmp_path):
     (tmp_path / "full").mkdir()
     (tmp_path / "full/file").touch()
     for arguments, words in (
