@@ -77,7 +77,7 @@ cameras:
 stereo:
   - {{name: pair, left: left, right: right, images: rectified}}
 """
-FORMS = ["coco", "kitti-object"]
+FORMS = ["coco", "kitti-object", "nuscenes"]
 
 
 @functools.cache
@@ -218,6 +218,7 @@ __all__ = [
     "corners_of_box",
     "half_of_box",
     "instances_of",
+    "matrix",
     "mount_of",
     "moved",
     "pinhole_of",

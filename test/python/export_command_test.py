@@ -93,6 +93,7 @@ def test_output_to_a_file_or_into_the_dataset_is_rejected(run, capsys):
         (["--to", "tum", "--lidar", "top"], "--lidar applies to"),
         (["--to", "kitti", "--labels", "map.yaml"], "--labels applies to coco, labels, las"),
         (["--to", "npz", "--boxes-of", "tree"], "--boxes-of applies to coco"),
+        (["--to", "nuscenes", "--keyframe-s", "0"], "0 must be above 0"),
         (["--to", "kitti-object", "--split", "50,60,-10"], "must be three percentages with the"),
         (["--to", "coco", "--crowd-below-px", "-1"], "-1 must not be negative"),
         (["--to", "tum", "--depth-per-m", "0"], "0 must be above 0"),
@@ -212,6 +213,10 @@ def test_echoes_of_air_and_false_alarms_are_counted(run, capsys):
                 "images are exported as pictures only",
                 "here top: front is left out",
             ],
+        ),
+        (
+            "nuscenes",
+            ["points have only x, y, z, intensity and ring", "front has no boxes", "map is empty"],
         ),
         ("coco", ["coco contains only cameras: lidars are not exported"]),
     ],

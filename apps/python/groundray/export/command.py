@@ -19,6 +19,7 @@ from groundray.export import (
     kitti_object,
     label_images,
     las,
+    nuscenes,
     ros_bag,
     tum,
 )
@@ -71,12 +72,14 @@ def _labels(options: argparse.Namespace, most: int, dataset: Dataset, notes: Not
 
 
 def _categories(options: argparse.Namespace, dataset: Dataset, notes: Notes) -> Categories:
-    """Returns the categories of the set that --labels names; else the dataset's own labels."""
+    """Returns the categories of the set that --labels names, or nuScenes'; else own labels."""
     chosen = _set_of(options)
     if chosen is None and options.labels:
         rule = f"--labels {options.labels}: {options.to} needs the name of a set, such as rellis_3d"
         raise Error(f"{rule}: a map of labels has no names of categories")
-    return Categories(dataset, chosen, _labels(options, 65535, dataset, notes))
+    if chosen is None and options.to == "nuscenes" and dataset.classes:
+        chosen = find_set("nuscenes_lidarseg")
+    return Categories(dataset, chosen, notes)
 
 
 def _export(options: argparse.Namespace, out: Path, dataset: Dataset, notes: Notes) -> str:
@@ -107,6 +110,15 @@ def _export(options: argparse.Namespace, out: Path, dataset: Dataset, notes: Not
         choice, split = BoxChoice(dataset, options.boxes_of), options.split or (100, 0, 0)
         objects = kitti_object.KittiObjectOptions(full_scale, choice, split)
         return kitti_object.write_kitti_object(dataset, lidars, cameras, objects, out, notes)
+    if options.to == "nuscenes":
+        tables = nuscenes.NuscenesOptions(
+            full_scale,
+            _categories(options, dataset, notes),
+            BoxChoice(dataset, options.boxes_of),
+            options.sequence or 0,
+            round((options.keyframe_s or 0.5) * 1e9),
+        )
+        return nuscenes.write_nuscenes(dataset, lidars, cameras, tables, out, notes)
     if options.to == "labels":
         chosen = _set_of(options)
         if chosen is None:

@@ -115,15 +115,16 @@ class _Writer:
 
     def _calibration(self) -> str:
         P_left, P_right = self.view.matrices
-        X_SC = np.linalg.inv(self.lidar.X_BS) @ self.view.X_BC(self.lidar)
-        lines = {
+        X_CB = np.linalg.inv(self.view.X_BC(self.lidar)).astype(np.float64)
+        X_SB = np.linalg.inv(self.lidar.X_BS).astype(np.float64)
+        lines: dict[str, Floats] = {
             "P0": P_left,
             "P1": P_right,
             "P2": P_left,
             "P3": P_right,
-            "R0_rect": np.eye(3, dtype=np.float64),
-            "Tr_velo_to_cam": np.linalg.inv(X_SC)[:3],
-            "Tr_imu_to_velo": np.linalg.inv(self.lidar.X_BS)[:3],
+            "R0_rect": np.eye(3),
+            "Tr_velo_to_cam": (X_CB @ self.lidar.X_BS)[:3],
+            "Tr_imu_to_velo": X_SB[:3],
         }
         return "".join(f"{name}: {numbers_text(matrix)}\n" for name, matrix in lines.items())
 

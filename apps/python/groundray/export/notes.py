@@ -8,7 +8,7 @@ from groundray.dataset import Camera, Dataset, Lidar
 
 _OF_SCANS = {"pcd", "las", "laz", "npz"}
 _OF_CAMERAS = {"tum", "denoised", "coco"}
-_WITH_BOXES = {"kitti-object"}
+_WITH_BOXES = {"kitti-object", "nuscenes"}
 _PRODUCTS = {
     "_boxes.npy": "boxes are not exported",
     "_no_returns.ply": "tables of pulses without an echo are not exported",
@@ -42,6 +42,8 @@ def tell_of_columns(form: str, layout: str, notes: Notes) -> None:
         notes.tell("points have only x, y, z and intensity: no times, rings, returns or truth")
     elif form == "semantic-kitti":
         notes.tell("labels and instances are the only truth of points; no times, rings or returns")
+    elif form == "nuscenes":
+        notes.tell("points have only x, y, z, intensity and ring: no times, returns or truth")
     elif form == "mcap" and layout != "full":
         notes.tell(f"points have only the fields of the {layout} layout, and no truth")
 

@@ -20,22 +20,24 @@ FORMS = (
     "labels",
     "coco",
     "kitti-object",
+    "nuscenes",
 )
 KITTI, LAS = {"kitti", "semantic-kitti"}, {"las", "laz"}
 OF_CAMERAS = {"tum", "denoised", "coco"}  # without scans
-_BOXED = {"coco", "kitti-object"}
+_BOXED = {"coco", "kitti-object", "nuscenes"}
 # Formats that an option applies to; options not listed apply to all.
 _ONLY_OF = {
     "lidar": set(FORMS) - OF_CAMERAS,
-    "camera": KITTI | {"kitti-object", "mcap", "labels"} | OF_CAMERAS,
-    "no_images": KITTI | {"mcap"},
-    "intensity_full_scale": KITTI | LAS | {"kitti-object", "mcap"},
-    "sequence": KITTI,
-    "labels": {"semantic-kitti", "labels", "coco"} | LAS,
+    "camera": KITTI | {"kitti-object", "nuscenes", "mcap", "labels"} | OF_CAMERAS,
+    "no_images": KITTI | {"mcap", "nuscenes"},
+    "intensity_full_scale": KITTI | LAS | {"kitti-object", "nuscenes", "mcap"},
+    "sequence": KITTI | {"nuscenes"},
+    "labels": {"semantic-kitti", "labels", "coco", "nuscenes"} | LAS,
     "boxes_of": _BOXED,
     "segmentation": {"coco"},
     "crowd_below_px": {"coco"},
     "split": {"kitti-object"},
+    "keyframe_s": {"nuscenes"},
     "depth_per_m": {"tum"},
     "columns": {"pcd"},
     "frame": {"pcd"},
@@ -100,7 +102,7 @@ def _add_choices(group: argparse._ArgumentGroup) -> None:
     add = group.add_argument
     add("--lidar", action="append", metavar="NAME", help="only this lidar; may be repeated")
     add("--camera", action="append", metavar="NAME", help="only this camera; may be repeated")
-    text = "omit cameras (kitti, semantic-kitti, mcap)"
+    text = "omit cameras (kitti, semantic-kitti, mcap, nuscenes)"
     add("--no-images", action="store_true", default=None, help=text)
 
 
@@ -134,11 +136,13 @@ def _add_boxes(group: argparse._ArgumentGroup) -> None:
     add("--crowd-below-px", type=_count, metavar="N", help=text)
     text = "percentages of KITTI's frames for train, val and test (default: 100,0,0)"
     add("--split", type=_percentages, metavar="A,B,C", help=text)
+    text = "time between samples of nuScenes (default: 0.5)"
+    add("--keyframe-s", type=_positive, metavar="T", help=text)
 
 
 def _add_others(group: argparse._ArgumentGroup) -> None:
     add = group.add_argument
-    text = "number of KITTI's first sequence (default: 0)"
+    text = "number of KITTI's first sequence, or of nuScenes' scene (default: 0)"
     add("--sequence", type=_whole, metavar="N", help=text)
     text = "depth value of a metre in TUM (default: 5000)"
     add("--depth-per-m", type=_positive, metavar="N", help=text)
