@@ -1,6 +1,7 @@
 """The command groundray-export: it rejects invalid usage and leaves no partial files."""
 
 import copy
+import importlib
 import os
 import shutil
 import signal
@@ -32,12 +33,12 @@ def edit(file, old, new, count=1):
     file.write_text(text.replace(old, new, count))
 
 
-def only(run, kind, frames=None):
+def only(run, kind, frames=None, lidar="bare-16"):
     """Keeps sensors of one kind in dataset.yaml; with `frames`, one lidar and this many scans."""
     record = yaml.safe_load((run / "dataset.yaml").read_text())
     sensors = [each for each in record["sensors"] if each["kind"] == kind]
     if frames is not None:
-        sensors = [{**each, "frames": frames} for each in sensors if each["name"] == "bare-16"]
+        sensors = [{**each, "frames": frames} for each in sensors if each["name"] == lidar]
     names = [each["name"] for each in sensors]
     listed = [each for each in record["frames"] if each["sensor"] in names]
     if frames is not None:
@@ -45,9 +46,10 @@ def only(run, kind, frames=None):
             {**copy.deepcopy(listed[0]), "frame": i, "stamp_s": 0.001 * i} for i in range(frames)
         ]
         for i in range(1, frames):
-            file = run / f"lidar/bare-16/{i:06}.ply"
-            file.unlink(missing_ok=True)
-            os.link(run / "lidar/bare-16/000000.ply", file)
+            for first in (run / f"lidar/{lidar}").glob("000000*"):
+                file = first.with_name(first.name.replace("000000", f"{i:06}"))
+                file.unlink(missing_ok=True)
+                os.link(first, file)
     record |= {"sensors": sensors, "frames": listed}
     (run / "dataset.yaml").write_text(yaml.safe_dump(record))
 
@@ -280,6 +282,25 @@ def test_an_interrupt_that_a_library_turns_into_its_own_error_is_one(
     assert names_in(tmp_path) == []
 
 
+@pytest.mark.parametrize("form", OF_BOXES)
+def test_an_interrupt_between_frames_leaves_no_files(tmp_path, capsys, monkeypatch, form):
+    module = importlib.import_module(f"groundray.export.{form.replace('-', '_')}")
+    read, frames = module.read_boxes, []
+
+    def read_or_stop(*arguments):
+        frames.append(arguments)
+        if len(frames) == 3:
+            assert list(tmp_path.glob(".out.*.part/*"))
+            os.kill(os.getpid(), signal.SIGTERM)
+        return read(*arguments)
+
+    monkeypatch.setattr(module, "read_boxes", read_or_stop)
+    assert export(form, tmp_path / "out", source=source_of(form)) == 130
+    assert capsys.readouterr().err == "groundray-export: interrupted; nothing was written\n"
+    assert len(frames) == 3
+    assert names_in(tmp_path) == []
+
+
 def test_the_sigterm_handler_of_the_caller_is_restored(tmp_path, capsys):
     before = signal.signal(signal.SIGTERM, signal.SIG_IGN)
     try:
@@ -321,12 +342,12 @@ def test_a_full_disk_is_reported_and_leaves_no_files(tmp_path, form):
     assert names_in(tmp_path) == []
 
 
-@pytest.mark.parametrize("form", ["kitti", "laz", "npz", "mcap"])
+@pytest.mark.parametrize("form", ["kitti", "laz", "npz", "mcap", "nuscenes"])
 def test_memory_does_not_grow_with_the_number_of_scans(run, form):
     """One more scan in memory takes 3 MB; 46 of them take 140 MB."""
     peaks_kb = []
     for frames in (4, 50):
-        only(run, "lidar", frames=frames)
+        only(run, "lidar", frames=frames, lidar="top" if form == "nuscenes" else "bare-16")
         code = (
             "import resource, sys; from groundray.export.command import main; code = main(); "
             "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss); sys.exit(code)"

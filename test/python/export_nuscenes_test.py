@@ -139,8 +139,8 @@ class Devkit(Own):
         super().__init__(out)
         nuscenes = pytest.importorskip(
             "nuscenes.nuscenes",
-            reason="nuscenes-devkit requires numpy<2, the other checks 2: pip install --no-deps "
-            "nuscenes-devkit, and pyquaternion, cachetools, shapely, descartes and fire",
+            reason="nuscenes-devkit requires numpy<2, which the other checks do not have: install "
+            "it by pip --no-deps, with pyquaternion, cachetools, shapely, descartes and fire",
             exc_type=ImportError,
         )
         self.kit = nuscenes.NuScenes(VERSION, str(out), verbose=False)
