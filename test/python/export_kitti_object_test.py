@@ -248,6 +248,25 @@ def run(tmp_path):
     return shutil.copytree(boxed_folder(), tmp_path / "run")
 
 
+def test_a_box_of_another_time_is_moved_to_that_of_the_picture(exported, run):
+    """As with a rolling shutter, boxes here have times of their own, along their velocity."""
+    for i in range(12):
+        file = run / f"camera/left/{i:06}_boxes.npy"
+        boxes = np.load(file)
+        later_s = 0.03 * np.random.default_rng(i).uniform(-1, 1, len(boxes))
+        boxes["time_s"] += later_s
+        for k in "xyz":
+            boxes[f"{k}_m"] += later_s * boxes[f"v{k}_m_s"]
+        np.save(file, boxes)
+    out = run.parent / "out"
+    assert export("kitti-object", out, source=run) == 0
+    for i in range(12):
+        for ours, line in zip(text(out, i), text(exported, i), strict=True):
+            # Six decimals; times of boxes are rounded to nanoseconds.
+            numbers, expected = (np.array(each.split()[1:], float) for each in (ours, line))
+            np.testing.assert_allclose(numbers, expected, atol=2e-6)
+
+
 def test_the_left_camera_must_have_boxes(run, capsys):
     for file in (run / "camera/left").glob("*_boxes.npy"):
         file.unlink()

@@ -114,14 +114,11 @@ class _Instances:
 
     def _single(self, box: Box, extent: Extent, mask: Mask, category: int) -> Record:
         left, top, _, _ = extent.visible
-        segmentation: Any
-        if self.options.with_polygons:
-            segmentation = polygons(mask, left, top)
-        else:
-            width, height = self.camera.size_px
-            whole = np.zeros((height, width), bool)
-            _part(whole, extent.visible)[...] = mask
-            segmentation = {"size": [height, width], "counts": run_lengths(whole)}
+        segmentation = (
+            polygons(mask, left, top)
+            if self.options.with_polygons
+            else _run_lengths(mask, left, top, self.camera.size_px)
+        )
         return {
             "category_id": category,
             "segmentation": segmentation,
@@ -146,11 +143,15 @@ def _crowd(category: int, mask: Mask) -> Record:
     ends = (int(columns.min()), int(rows.min()), int(columns.max()), int(rows.max()))
     return {
         "category_id": category,
-        "segmentation": {"size": list(mask.shape), "counts": run_lengths(mask)},
+        "segmentation": _run_lengths(mask, 0, 0, (mask.shape[1], mask.shape[0])),
         "area": len(rows),
         "bbox": _bbox(ends),
         "iscrowd": 1,
     }
+
+
+def _run_lengths(mask: Mask, left: int, top: int, size_px: tuple[int, int]) -> Record:
+    return {"size": [size_px[1], size_px[0]], "counts": run_lengths(mask, left, top, size_px)}
 
 
 def _part(pixels: Any, rectangle: Rectangle) -> Any:

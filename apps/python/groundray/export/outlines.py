@@ -12,12 +12,22 @@ Mask = NDArray[np.bool_]
 _Corner = tuple[int, int]
 
 
-def run_lengths(mask: Mask) -> list[int]:
-    """Returns COCO's run lengths: of 0 and 1 in turn, column by column, beginning with 0."""
-    flat = np.asarray(mask, dtype=np.int8).ravel(order="F")
-    changes = np.flatnonzero(np.diff(flat, prepend=np.int8(0)))
-    ends = np.concatenate([[0], changes, [flat.size]])
-    return [int(length) for length in np.diff(ends)]
+def run_lengths(mask: Mask, left: int, top: int, size_px: tuple[int, int]) -> list[int]:
+    """Returns COCO's run lengths: of 0 and 1 in turn, column by column, beginning with 0.
+
+    Args:
+        mask: height x width, a part of the image.
+        left, top: column and row of its first pixel in the image.
+        size_px: width and height of the image.
+    """
+    width, height = size_px
+    columns, rows = np.nonzero(mask.T)
+    pixels = (columns + left) * height + rows + top
+    is_first = np.diff(pixels, prepend=-2) > 1
+    begins, ends = pixels[is_first], pixels[np.roll(is_first, -1)] + 1
+    places = np.concatenate([[0], np.stack([begins, ends], axis=1).ravel(), [width * height]])
+    lengths = [int(length) for length in np.diff(places)]
+    return lengths if lengths[-1] else lengths[:-1]
 
 
 def polygons(mask: Mask, left: int = 0, top: int = 0) -> list[list[int]]:
@@ -83,5 +93,6 @@ def _steps(mask: Mask) -> dict[_Corner, list[_Corner]]:
 
 
 def _doubled_area(loop: list[_Corner]) -> int:
-    xs, ys = np.array(loop, dtype=np.int64).T
-    return int(np.dot(xs, np.roll(ys, -1)) - np.dot(ys, np.roll(xs, -1)))
+    """Returns twice the enclosed area; negative around a hole."""
+    pairs = zip(loop, loop[1:] + loop[:1], strict=True)
+    return sum(x * y_next - x_next * y for (x, y), (x_next, y_next) in pairs)
