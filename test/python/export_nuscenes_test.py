@@ -496,6 +496,32 @@ def test_a_dataset_without_boxes_has_one_message(tmp_path, capsys):
     )
 
 
+def test_times_are_those_of_the_clock_of_the_dataset(tmp_path, capsys):
+    run = shutil.copytree(boxed_folder(), tmp_path / "run")
+    text = (run / "dataset.yaml").read_text()
+    later = text.replace("time_origin_s: 0.000000000", "time_origin_s: 1782057600.250000001", 1)
+    assert later != text
+    (run / "dataset.yaml").write_text(later)
+    assert export("nuscenes", tmp_path / "out", source=run) == 0
+    own = Own(tmp_path / "out")
+    assert own.rows["log"][0]["date_captured"] == "2026-06-21"
+    # Ten scans a second, and two samples.
+    for row, stamp_s in zip(own.rows["sample"], stamps_s("top")[::5], strict=True):
+        nanoseconds = 1782057600250000001 + round(stamp_s * 1e9)
+        assert row["timestamp"] == (nanoseconds + 500) // 1000
+
+
+def test_stamps_that_do_not_increase_have_one_message(tmp_path, capsys):
+    run = shutil.copytree(boxed_folder(), tmp_path / "run")
+    text = (run / "dataset.yaml").read_text()
+    stamps = [f"frame: {i}, stamp_s: {stamps_s('left')[i]:.9f}" for i in (3, 4)]
+    assert all(text.count(f'sensor: "left", {each}') == 1 for each in stamps)
+    same = text.replace(f'"left", {stamps[1]}', f'"left", frame: 4, stamp_s: {stamps_s("left")[3]}')
+    (run / "dataset.yaml").write_text(same)
+    line = fails(capsys, run, "nuscenes")
+    assert "the stamps of left do not increase by microseconds; was it edited?" in line
+
+
 def test_two_sensors_of_one_channel_have_one_message(tmp_path):
     from groundray.dataset import Dataset, Error
     from groundray.export.boxes import BoxChoice

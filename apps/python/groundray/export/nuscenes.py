@@ -7,6 +7,7 @@ import json
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -184,49 +185,60 @@ class _Scene:
     def _write_sensor(self, sensor: Lidar | Camera, channel: str) -> None:
         """Writes the files of a sensor and adds their rows; keeps what annotations need."""
         path = SensorPath(self._dataset.path_file(sensor))
-        mount = sensor.X_BC if isinstance(sensor, Camera) else sensor.X_BS
         with_boxes = has_boxes(self._dataset, sensor)
         if not with_boxes:
             self._notes.tell(f"{sensor.name} has no boxes: what it alone sees has no annotation")
-        rows: list[Row] = []
         for folder in ("samples", "sweeps"):
             (self._out / folder / channel).mkdir(parents=True)
         data = self._data_of(sensor)
+        rows = []
         for datum in data:
-            time_us = microseconds(self._dataset, datum.time_ns)
-            is_image = isinstance(sensor, Camera)
-            name = f"{'samples' if datum.is_key else 'sweeps'}/{channel}/"
-            name += f"{self._name}__{channel}__{time_us}.{'png' if is_image else 'pcd.bin'}"
-            (self._out / name).write_bytes(self._file_of(datum, path))
-            key = [channel, datum.frame.number]
-            X_DB = path.pose_at(datum.time_ns) @ np.linalg.inv(mount)
-            pose = self._tables.add("ego_pose", key, {"timestamp": time_us, **place(X_DB)})
-            row = {
-                "sample_token": self._samples[datum.sample],
-                "ego_pose_token": pose,
-                "calibrated_sensor_token": self._tables.token("calibrated_sensor", channel),
-                "timestamp": time_us,
-                "fileformat": "png" if is_image else "pcd",
-                "is_key_frame": datum.is_key,
-                "height": sensor.size_px[1] if isinstance(sensor, Camera) else 0,
-                "width": sensor.size_px[0] if isinstance(sensor, Camera) else 0,
-                "filename": name,
-            }
-            self._tables.add("sample_data", key, row)
-            rows.append(self._tables.rows["sample_data"][-1])
+            rows.append(self._add_datum(datum, channel, path))
+            (self._out / rows[-1]["filename"]).write_bytes(self._file_of(datum, path))
             if datum.is_key and with_boxes:
                 self._keep_boxes(datum)
         chain(rows)
         missing = len(self._samples) - sum(datum.is_key for datum in data)
         self._notes.count("{} samples have no frame of " + sensor.name + " near them", missing)
 
+    def _add_datum(self, datum: _Datum, channel: str, path: SensorPath) -> Row:
+        """Adds the pose of the body at a frame, and the frame; returns its row."""
+        sensor, time_us = datum.sensor, microseconds(self._dataset, datum.time_ns)
+        is_camera = isinstance(sensor, Camera)
+        name = f"{'samples' if datum.is_key else 'sweeps'}/{channel}/"
+        name += f"{self._name}__{channel}__{time_us}.{'png' if is_camera else 'pcd.bin'}"
+        mount = sensor.X_BC if isinstance(sensor, Camera) else sensor.X_BS
+        X_DB = path.pose_at(datum.time_ns) @ np.linalg.inv(mount)
+        key = [channel, datum.frame.number]
+        pose = self._tables.add("ego_pose", key, {"timestamp": time_us, **place(X_DB)})
+        width, height = sensor.size_px if isinstance(sensor, Camera) else (0, 0)
+        row = {
+            "sample_token": self._samples[datum.sample],
+            "ego_pose_token": pose,
+            "calibrated_sensor_token": self._tables.token("calibrated_sensor", channel),
+            "timestamp": time_us,
+            "fileformat": "png" if is_camera else "pcd",
+            "is_key_frame": datum.is_key,
+            "height": height,
+            "width": width,
+            "filename": name,
+        }
+        self._tables.add("sample_data", key, row)
+        return self._tables.rows["sample_data"][-1]
+
     def _data_of(self, sensor: Lidar | Camera) -> list[_Datum]:
         """Assigns frames to samples: the nearest one is key frame, others belong to the next."""
         middle_ns = sensor.middle_ns if isinstance(sensor, Camera) else 0
         times_ns = [frame.stamp_ns + middle_ns for frame in sensor.frames]
+        times_us = [microseconds(self._dataset, time_ns) for time_ns in times_ns]
+        if any(before >= after for before, after in pairwise(times_us)):
+            rule = f"the stamps of {sensor.name} do not increase by microseconds"
+            raise Error(f"{self._dataset.folder / 'dataset.yaml'}: {rule}; was it edited?")
         keys: dict[int, int] = {}
         for i, sample_ns in enumerate(self._samples_ns if times_ns else []):
-            near = min(range(len(times_ns)), key=lambda k: abs(times_ns[k] - sample_ns))
+            after = bisect.bisect_left(times_ns, sample_ns)
+            around = range(max(after - 1, 0), min(after + 1, len(times_ns)))
+            near = min(around, key=lambda k: abs(times_ns[k] - sample_ns))
             if abs(times_ns[near] - sample_ns) <= self._options.keyframe_ns // 2:
                 keys.setdefault(near, i)
         last = len(self._samples_ns) - 1
@@ -244,7 +256,10 @@ class _Scene:
     def _file_of(self, datum: _Datum, path: SensorPath) -> bytes:
         """Returns the picture, or the points at the datum's time; counts points of instances."""
         if isinstance(datum.sensor, Camera):
-            return read_picture(self._dataset, datum.sensor, datum.frame).data
+            picture = read_picture(self._dataset, datum.sensor, datum.frame)
+            if picture.bits == 16:
+                self._notes.tell("pictures have 16 bits, but nuScenes' have 8")
+            return picture.data
         scan = read_scan(self._dataset, datum.sensor, datum.frame)
         tell_of_scan(scan, self._notes)
         if datum.is_key:
