@@ -1,20 +1,16 @@
 """nuScenes folders, read by nuscenes-devkit where installed, and by the words of its schema."""
 
+import functools
 import json
 import shutil
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
 from detection_runs import (
-    SIGNS,
     boxed_folder,
-    boxes_of,
     corners_of_box,
     half_of_box,
-    matrix,
-    mount_of,
     moved,
     pinhole_of,
     pose_of,
@@ -25,50 +21,17 @@ from detection_runs import (
     stamps_s,
 )
 from export_runs import export, fails, names_in, run_folder, still, world_of
-from scipy.spatial.transform import Rotation
+from nuscenes_readers import (
+    MIDDLE_S,
+    PLACE_M,
+    Devkit,
+    Own,
+    annotations_of,
+    nuscenes_folder,
+    sample_frames,
+    tables_of,
+)
 
-VERSION = "v1.0-trainval"
-# Foreign keys of each table, by the schema in the documentation of nuscenes-devkit.
-KEYS = {
-    "attribute": {},
-    "calibrated_sensor": {"sensor_token": "sensor"},
-    "category": {},
-    "ego_pose": {},
-    "instance": {
-        "category_token": "category",
-        "first_annotation_token": "sample_annotation",
-        "last_annotation_token": "sample_annotation",
-    },
-    "log": {},
-    "map": {"log_tokens": "log"},
-    "sample": {"scene_token": "scene", "prev": "sample", "next": "sample"},
-    "sample_annotation": {
-        "sample_token": "sample",
-        "instance_token": "instance",
-        "attribute_tokens": "attribute",
-        "visibility_token": "visibility",
-        "prev": "sample_annotation",
-        "next": "sample_annotation",
-    },
-    "sample_data": {
-        "sample_token": "sample",
-        "ego_pose_token": "ego_pose",
-        "calibrated_sensor_token": "calibrated_sensor",
-        "prev": "sample_data",
-        "next": "sample_data",
-    },
-    "scene": {
-        "log_token": "log",
-        "first_sample_token": "sample",
-        "last_sample_token": "sample",
-    },
-    "sensor": {},
-    "visibility": {},
-}
-CHANNELS = {"LIDAR_TOP": "top", "LIDAR_FRONT": "front", "CAM_LEFT": "left", "CAM_RIGHT": "right"}
-MIDDLE_S = 0.001  # of the exposure
-# The path between its lines by slerp, not by screws: well below a millimetre.
-PLACE_M = 3e-4
 NAMES = {
     4: "static.other",
     6: "static.vegetation",
@@ -77,251 +40,19 @@ NAMES = {
 }
 
 
-@pytest.fixture(scope="module")
-def exported(tmp_path_factory):
-    out = tmp_path_factory.mktemp("nuscenes") / "out"
-    assert export("nuscenes", out, "--keyframe-s", "0.3", source=boxed_folder()) == 0
-    return out
+@functools.cache
+def read_by(kind):
+    return kind(nuscenes_folder())
 
 
-class Own:
-    """Reads the tables by the words of the schema."""
-
-    def __init__(self, out):
-        self.out = out
-        self.rows = {
-            name: json.loads((out / VERSION / f"{name}.json").read_text()) for name in KEYS
-        }
-        self.by_token = {
-            name: {row["token"]: row for row in rows} for name, rows in self.rows.items()
-        }
-
-    def get(self, table, token):
-        return self.by_token[table][token]
-
-    def pose(self, row):
-        w, x, y, z = row["rotation"]
-        return matrix(Rotation.from_quat([x, y, z, w]), row["translation"])
-
-    def sensor_pose(self, data):
-        """Returns the pose of the sensor in the global frame."""
-        ego = self.get("ego_pose", data["ego_pose_token"])
-        mount = self.get("calibrated_sensor", data["calibrated_sensor_token"])
-        return self.pose(ego) @ self.pose(mount)
-
-    def corners(self, data, annotation):
-        """Returns the corners of a box in a sensor's frame, in the order of SIGNS."""
-        width, length, height = annotation["size"]
-        corners = moved(self.pose(annotation), SIGNS * np.array([length, width, height]) / 2)
-        return moved(np.linalg.inv(self.sensor_pose(data)), corners)
-
-    def velocity(self, token):
-        here = self.get("sample_annotation", token)
-        ends = [
-            self.get("sample_annotation", here[end]) if here[end] else here
-            for end in ("prev", "next")
-        ]
-        times_us = [self.get("sample", each["sample_token"])["timestamp"] for each in ends]
-        if times_us[0] == times_us[1]:
-            return np.full(3, np.nan)
-        first, last = (np.array(each["translation"]) for each in ends)
-        return (last - first) / ((times_us[1] - times_us[0]) * 1e-6)
-
-    def points(self, data):
-        """Returns x, y, z, intensity."""
-        return np.fromfile(self.out / data["filename"], np.float32).reshape(-1, 5)[:, :4]
+@pytest.fixture(params=[Own, Devkit])
+def reader(request):
+    return read_by(request.param)
 
 
-class Devkit(Own):
-    """The same by nuscenes-devkit."""
-
-    def __init__(self, out):
-        super().__init__(out)
-        nuscenes = pytest.importorskip(
-            "nuscenes.nuscenes",
-            reason="nuscenes-devkit requires numpy<2, which the other checks do not have: install "
-            "it by pip --no-deps, with pyquaternion, cachetools, shapely, descartes and fire",
-            exc_type=ImportError,
-        )
-        self.kit = nuscenes.NuScenes(VERSION, str(out), verbose=False)
-
-    def corners(self, data, annotation):
-        from nuscenes.utils.geometry_utils import BoxVisibility
-
-        _, (box,), _ = self.kit.get_sample_data(
-            data["token"], BoxVisibility.NONE, [annotation["token"]]
-        )
-        theirs = [[x, y, z] for x in (1, -1) for y, z in ((1, 1), (-1, 1), (-1, -1), (1, -1))]
-        corners = box.corners().T  # in front, then behind, from above on the left clockwise
-        return np.stack([corners[theirs.index(signs)] for signs in SIGNS.tolist()])
-
-    def velocity(self, token):
-        return self.kit.box_velocity(token)
-
-    def points(self, data):
-        from nuscenes.utils.data_classes import LidarPointCloud
-
-        path = self.kit.get_sample_data_path(data["token"])
-        return LidarPointCloud.from_file(path).points.T
-
-
-@pytest.fixture(scope="module", params=[Own, Devkit])
-def reader(request, exported):
-    return request.param(exported)
-
-
-@pytest.fixture(scope="module")
-def own(exported):
-    return Own(exported)
-
-
-def test_every_token_is_unique_and_every_key_leads_to_a_row(own):
-    tokens = [row["token"] for name in KEYS for row in own.rows[name]]
-    assert len(set(tokens)) == len(tokens)
-    for name, keys in KEYS.items():
-        assert own.rows[name], name
-        assert len({frozenset(row) for row in own.rows[name]}) == 1
-        for row in own.rows[name]:
-            for field, table in keys.items():
-                value = row[field]
-                for token in value if isinstance(value, list) else [value]:
-                    assert token in own.by_token[table] or (
-                        token == "" and field in ("prev", "next")
-                    ), (name, field)
-
-
-def chains_of(rows):
-    """Follows next from each first row; returns the chains."""
-    by_token = {row["token"]: row for row in rows}
-    chains = []
-    for row in (row for row in rows if not row["prev"]):
-        chain = [row]
-        while chain[-1]["next"]:
-            following = by_token[chain[-1]["next"]]
-            assert following["prev"] == chain[-1]["token"]
-            chain.append(following)
-        chains.append(chain)
-    assert sum(map(len, chains)) == len(rows)  # no row is outside of all, or in a circle
-    return chains
-
-
-def test_chains_are_complete_and_in_order_of_time(own):
-    (scene,) = own.rows["scene"]
-    (samples,) = chains_of(own.rows["sample"])
-    assert scene["nbr_samples"] == len(samples) == 4
-    assert scene["first_sample_token"] == samples[0]["token"]
-    assert scene["last_sample_token"] == samples[-1]["token"]
-    for before, after in pairwise(samples):
-        assert 297_000 <= after["timestamp"] - before["timestamp"] < 400_000
-    order = {row["token"]: i for i, row in enumerate(samples)}
-    chains = chains_of(own.rows["sample_data"])
-    assert len(chains) == len(CHANNELS)
-    for chain in chains:
-        assert len({row["calibrated_sensor_token"] for row in chain}) == 1
-        assert all(a["timestamp"] < b["timestamp"] for a, b in pairwise(chain))
-        keys = [order[row["sample_token"]] for row in chain if row["is_key_frame"]]
-        assert keys == list(range(4))
-        for row in chain:
-            sample = samples[order[row["sample_token"]]]
-            if row["is_key_frame"]:
-                nearest = min(abs(each["timestamp"] - sample["timestamp"]) for each in chain)
-                assert abs(row["timestamp"] - sample["timestamp"]) == nearest
-            elif sample is not samples[-1]:  # it belongs to the sample that follows it
-                assert row["timestamp"] <= sample["timestamp"]
-                before = samples[order[row["sample_token"]] - 1]
-                assert row["timestamp"] > before["timestamp"]
-    chains = {
-        chain[0]["instance_token"]: chain for chain in chains_of(own.rows["sample_annotation"])
-    }
-    assert set(chains) == set(own.by_token["instance"])
-    for token, chain in chains.items():
-        instance = own.get("instance", token)
-        assert {row["instance_token"] for row in chain} == {token}
-        assert instance["nbr_annotations"] == len(chain)
-        assert instance["first_annotation_token"] == chain[0]["token"]
-        assert instance["last_annotation_token"] == chain[-1]["token"]
-        places = [order[row["sample_token"]] for row in chain]
-        assert places == sorted(set(places))
-
-
-def channel_of(own, data):
-    mount = own.get("calibrated_sensor", data["calibrated_sensor_token"])
-    return own.get("sensor", mount["sensor_token"])["channel"]
-
-
-def frame_of(own, data):
-    """Returns the sensor and the number of a frame, by its time."""
-    sensor = CHANNELS[channel_of(own, data)]
-    later_s = MIDDLE_S if sensor in ("left", "right") else 0
-    apart_s = np.abs(np.array(stamps_s(sensor)) + later_s - data["timestamp"] * 1e-6)
-    assert apart_s.min() < 1e-6
-    return sensor, int(apart_s.argmin())
-
-
-def test_files_are_those_of_the_tables(own, exported):
-    listed = {row["filename"] for row in own.rows["sample_data"] + own.rows["map"]}
-    listed |= {f"{VERSION}/{name}.json" for name in (*KEYS, "splits")}
-    found = {p.relative_to(exported).as_posix() for p in exported.rglob("*") if p.is_file()}
-    assert found == listed
-    for data in own.rows["sample_data"]:
-        assert data["filename"].startswith("samples/" if data["is_key_frame"] else "sweeps/")
-        assert data["filename"].split("/")[1] == channel_of(own, data)
-        sensor, frame = frame_of(own, data)
-        if sensor in ("left", "right"):
-            recorded = boxed_folder() / f"camera/{sensor}/{frame:06}.png"
-            assert (exported / data["filename"]).read_bytes() == recorded.read_bytes()
-            assert (data["width"], data["height"], data["fileformat"]) == (96, 72, "png")
-        else:
-            assert (data["width"], data["height"], data["fileformat"]) == (0, 0, "pcd")
-
-
-def test_calibration_and_poses_are_those_of_the_dataset(own):
-    for mount in own.rows["calibrated_sensor"]:
-        sensor = CHANNELS[own.get("sensor", mount["sensor_token"])["channel"]]
-        np.testing.assert_allclose(own.pose(mount), mount_of(sensor), atol=1e-12)
-        if sensor in ("left", "right"):
-            K = np.array(mount["camera_intrinsic"])
-            np.testing.assert_allclose(K, pinhole_of(sensor), rtol=1e-12)
-        else:
-            assert mount["camera_intrinsic"] == []
-    for data in own.rows["sample_data"]:
-        ego = own.get("ego_pose", data["ego_pose_token"])
-        assert ego["timestamp"] == data["timestamp"]
-        sensor, _ = frame_of(own, data)
-        X_DS = pose_of(sensor, data["timestamp"] * 1e-6)
-        np.testing.assert_allclose(own.sensor_pose(data), X_DS, atol=PLACE_M)
-
-
-def sample_frames(own):
-    """Yields each sample with its time and the key frame of each sensor."""
-    for sample in own.rows["sample"]:
-        keys = {}
-        for data in own.rows["sample_data"]:
-            if data["is_key_frame"] and data["sample_token"] == sample["token"]:
-                sensor, frame = frame_of(own, data)
-                keys[sensor] = (data, frame)
-        yield sample, sample["timestamp"] * 1e-6, keys
-
-
-def tables_of(keys):
-    """Returns the first box of each instance, with the stamp of its frame, and all of images."""
-    boxes, seen = {}, {}
-    for sensor in ("top", "left", "right"):
-        frame = keys[sensor][1]
-        for row in boxes_of(sensor, frame):
-            boxes.setdefault(int(row["instance"]), (row, stamps_s(sensor)[frame]))
-            if sensor != "top":
-                seen.setdefault(int(row["instance"]), []).append(row)
-    return boxes, seen
-
-
-def annotations_of(own, sample):
-    """Returns the annotations of a sample by the dataset's instances."""
-    return {
-        own.get("instance", row["instance_token"])["groundray_instance"]: row
-        for row in own.rows["sample_annotation"]
-        if row["sample_token"] == sample["token"]
-    }
+@pytest.fixture
+def own():
+    return read_by(Own)
 
 
 def test_corners_lie_where_the_dataset_places_them(reader):
@@ -448,8 +179,8 @@ def test_levels_of_visibility_and_attributes_are_those_of_the_boxes(own):
     }
 
 
-def test_the_devkits_evaluation_reads_boxes_and_the_split(exported):
-    kit = Devkit(exported).kit
+def test_the_devkits_evaluation_reads_boxes_and_the_split():
+    kit = read_by(Devkit).kit
     from nuscenes.eval.common.loaders import load_gt_of_sample_tokens
     from nuscenes.eval.detection.data_classes import DetectionBox
     from nuscenes.utils.splits import get_scenes_of_split
@@ -460,6 +191,43 @@ def test_the_devkits_evaluation_reads_boxes_and_the_split(exported):
     found = [box for token in tokens for box in truth[token]]
     assert {box.detection_name for box in found} == {"car", "pedestrian"}
     assert {box.attribute_name for box in found} == {"vehicle.moving", "pedestrian.moving"}
+
+
+def test_nuscenes_own_evaluation_finds_no_error_in_the_truth(tmp_path):
+    kit = read_by(Devkit).kit
+    from nuscenes.eval.detection.config import config_factory
+    from nuscenes.eval.detection.evaluate import DetectionEval
+    from nuscenes.eval.detection.utils import category_to_detection_name
+
+    names = {row["token"]: row["name"] for row in kit.attribute}
+    results = {sample["token"]: [] for sample in kit.sample}
+    for row in kit.sample_annotation:
+        kind = category_to_detection_name(row["category_name"])
+        if kind is not None:
+            results[row["sample_token"]].append(
+                {
+                    **{
+                        key: row[key] for key in ("sample_token", "translation", "size", "rotation")
+                    },
+                    "velocity": kit.box_velocity(row["token"])[:2].tolist(),
+                    "detection_name": kind,
+                    "detection_score": 0.9,
+                    "attribute_name": names[row["attribute_tokens"][0]],
+                }
+            )
+    used = {f"use_{kind}": kind == "lidar" for kind in ("camera", "lidar", "radar", "map")}
+    record = {"meta": {**used, "use_external": False}, "results": results}
+    (tmp_path / "found.json").write_text(json.dumps(record))
+    settings = config_factory("detection_cvpr_2019")
+    rating = DetectionEval(
+        kit, settings, str(tmp_path / "found.json"), "groundray", str(tmp_path), verbose=False
+    )
+    metrics, _ = rating.evaluate()
+    for kind in ("car", "pedestrian"):
+        for threshold_m in settings.dist_ths:
+            assert metrics.get_label_ap(kind, threshold_m) == pytest.approx(1)
+        for error in ("trans_err", "scale_err", "orient_err", "vel_err", "attr_err"):
+            assert metrics.get_label_tp(kind, error) == pytest.approx(0, abs=1e-6)
 
 
 def test_without_images_visibility_is_unknown(tmp_path, capsys):
