@@ -1,4 +1,4 @@
-"""nuScenes folders, read by nuscenes-devkit where installed, and by the words of its schema."""
+"""nuScenes folders, read by nuscenes-devkit, and by the words of its schema."""
 
 import functools
 import json

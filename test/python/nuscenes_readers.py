@@ -8,7 +8,6 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
-import pytest
 from detection_runs import SIGNS, boxed_folder, boxes_of, matrix, moved, stamps_s
 from export_runs import export
 from scipy.spatial.transform import Rotation
@@ -119,13 +118,9 @@ class Devkit(Own):
 
     def __init__(self, out):
         super().__init__(out)
-        nuscenes = pytest.importorskip(
-            "nuscenes.nuscenes",
-            reason="nuscenes-devkit requires numpy<2, which the other checks do not have: install "
-            "it by pip --no-deps, with pyquaternion, cachetools, shapely, descartes and fire",
-            exc_type=ImportError,
-        )
-        self.kit = nuscenes.NuScenes(VERSION, str(out), verbose=False)
+        from nuscenes.nuscenes import NuScenes
+
+        self.kit = NuScenes(VERSION, str(out), verbose=False)
 
     def corners(self, data, annotation):
         from nuscenes.utils.geometry_utils import BoxVisibility
