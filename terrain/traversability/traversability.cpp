@@ -231,6 +231,22 @@ void each_row(glm::ivec2 samples, const std::function<void(double)>& progress, d
   }
 }
 
+// Returns the height of the ground at a point; NaN where there is none. A query selects one facet:
+// at a point on the boundary of several, it may be one that does not exist beside a hole.
+double height_beside_holes_m(const Ground& ground, glm::dvec2 p) {
+  if (const auto height_m = ground.height_m_at(p)) return *height_m;
+  constexpr double aside = 1e-6;  // of a cell
+  const GridFrame& frame = ground.frame();
+  for (const glm::dvec2 way : {glm::dvec2(1, 1), glm::dvec2(-1, 1), glm::dvec2(1, -1),
+                               glm::dvec2(-1, -1), glm::dvec2(2, -1), glm::dvec2(-2, 1)}) {
+    const auto plane = ground.facet_at(p + aside * way * frame.step_m);
+    if (!plane) continue;
+    const glm::dvec2 at = frame.to_grid(p);
+    return plane->height_m + plane->u_slope_m * at.x + plane->v_slope_m * at.y;
+  }
+  return not_there;
+}
+
 // Samples the ground. The last samples may be beyond its edge by a rounding error.
 void sample(const Ground& ground, const std::function<void(double)>& progress,
             SampledGround& sampled, TraversabilityLayers& layers) {
@@ -238,7 +254,7 @@ void sample(const Ground& ground, const std::function<void(double)>& progress,
   const glm::dvec2 a = frame.to_D({0, 0}), b = frame.to_D(frame.samples - 1);
   each_row(sampled.frame.samples, progress, 0, sampling_share, [&](glm::ivec2 at, std::size_t i) {
     const glm::dvec2 p = glm::clamp(sampled.frame.to_D(at), glm::min(a, b), glm::max(a, b));
-    sampled.heights_m[i] = ground.height_m_at(p).value_or(not_there);
+    sampled.heights_m[i] = height_beside_holes_m(ground, p);
     layers.elevation_m[i] = static_cast<float>(sampled.heights_m[i]);
   });
 }

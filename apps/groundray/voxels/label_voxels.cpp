@@ -18,7 +18,7 @@ namespace {
 constexpr std::size_t tasks_at_once = 64;
 
 // Box of D that contains a grid.
-ModelBounds bounds_in_D(const VoxelGrid& grid, const Pose& X_DS) {
+ModelBounds bounds_of_grid(const VoxelGrid& grid, const Pose& X_DS) {
   constexpr double infinity = std::numeric_limits<double>::infinity();
   ModelBounds bounds{glm::dvec3(infinity), glm::dvec3(-infinity)};
   for (int corner = 0; corner < 8; ++corner) {
@@ -52,7 +52,7 @@ class GroundVoxeliser {
                   const Pose& X_SD, const VoxelLabelMap& map)
       : ground_(simulation.terrain.ground()), scene_(scene), grid_(grid), X_SD_(X_SD), map_(map) {
     const GridFrame& frame = ground_.frame();
-    within_ = bounds_in_D(grid, inverse(X_SD));
+    within_ = bounds_of_grid(grid, inverse(X_SD));
     const glm::dvec2 a = frame.to_grid(glm::dvec2(within_.low_m)),
                      b = frame.to_grid(glm::dvec2(within_.high_m));
     const glm::dvec2 last = glm::dvec2(frame.samples - 1);
