@@ -218,3 +218,25 @@ def test_mistakes_in_files_of_traversability_are_reported(hills, tmp_path):
         assert words in result.stderr
     assert not (tmp_path / "out").exists()
     assert sorted(p.name for p in (tmp_path / "full").iterdir()) == ["file"]
+
+
+def test_worlds_of_a_scene_are_those_that_sample_prints(tmp_path):
+    varied = "  relief: {cell_m: 0.5, fractal: {rms_m: 0.1, shortest_m: 2, longest_m: 8}}\n"
+    line = next(x for x in SCENE.splitlines() if x.startswith("terrain"))
+    scene = SCENE.replace(line, f"terrain:\n  dem: {PRAIRIE}\n  material: dry_soil\n{varied}")
+    worlds = "worlds: {count: 5, vary: {terrain.relief.fractal.rms_m: {uniform: [0.05, 0.5]}}}\n"
+    command(tmp_path, scene=scene + worlds)  # writes the files
+    sampled = groundray(
+        *("sample", tmp_path / "scene.yaml", "--index", 3, "-o", tmp_path / "3.yaml")
+    )
+    assert sampled.returncode == 0, sampled.stderr
+    large = {"length": 3, "width": 2, "wheelbase": 2, "wheel-radius": 1}
+    for source, out, more in (
+        ("3.yaml", "own", ()),
+        ("scene.yaml", "3", ("--world", 3)),
+        ("scene.yaml", "4", ("--world", 4)),
+    ):
+        result = layers(tmp_path / source, tmp_path / out, *more, cell=1, **large)
+        assert result.returncode == 0, result.stderr
+    assert files(tmp_path / "3") == files(tmp_path / "own")
+    assert files(tmp_path / "3")["elevation.tif"] != files(tmp_path / "4")["elevation.tif"]
