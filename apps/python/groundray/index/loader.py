@@ -168,7 +168,7 @@ class Frames:
                 numbers[int(unnamed[1])] = number
         for label, name in (classes | {0: NOTHING}).items():
             numbers[label] = self._numbers[name]
-        ids = numbers[np.minimum(labels, _LABELS - 1)]
+        ids: NDArray[np.int64] = numbers[np.minimum(labels, _LABELS - 1)]
         if ids.size and ids.min() < 0:
             unknown = class_name(int(labels[ids < 0][0]), classes)
             rule = f"a frame has the class {unknown}, which {self.index} does not list"

@@ -27,22 +27,28 @@ def class_name(label: int, classes: Mapping[int, str]) -> str:
     return NOTHING if label == 0 else classes.get(label, f"label {label}")
 
 
+def kind_of(sensor: Lidar | Camera) -> str:
+    """Returns `lidar` or `camera`, which is also the folder of its files."""
+    return "lidar" if isinstance(sensor, Lidar) else "camera"
+
+
 def rows_of(dataset: Dataset) -> Iterator[Row]:
     """Yields a row for each finished frame, by sensor.
 
     Raises Error if a file is missing, or damaged.
     """
-    for sensor in (*dataset.lidars, *dataset.cameras):
-        is_lidar = isinstance(sensor, Lidar)
-        path = SensorPath(dataset.path_file(sensor)) if sensor.frames else None
+    sensors: list[Lidar | Camera] = [*dataset.lidars, *dataset.cameras]
+    for sensor in sensors:
+        if not sensor.frames:
+            continue
+        path = SensorPath(dataset.path_file(sensor))
         files = _files_of(dataset, sensor)
         for frame in sensor.frames:
-            assert path is not None
             pose_ns = frame.stamp_ns + (0 if isinstance(sensor, Lidar) else sensor.middle_ns)
             own = files.get(frame.number, {})
             row: Row = {
                 "sensor": sensor.name,
-                "kind": "lidar" if is_lidar else "camera",
+                "kind": kind_of(sensor),
                 "model": sensor.model,
                 "frame": frame.number,
                 "stamp_ns": frame.stamp_ns,
@@ -61,8 +67,7 @@ def rows_of(dataset: Dataset) -> Iterator[Row]:
 
 def _files_of(dataset: Dataset, sensor: Lidar | Camera) -> dict[int, dict[str, str]]:
     """Returns the files of each frame, relative to the dataset, by the end of their names."""
-    kind = "lidar" if isinstance(sensor, Lidar) else "camera"
-    folder = f"{kind}/{sensor.name}"
+    folder = f"{kind_of(sensor)}/{sensor.name}"
     files: dict[int, dict[str, str]] = {}
     try:
         names = sorted(os.listdir(dataset.folder / folder))
