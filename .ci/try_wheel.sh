@@ -26,6 +26,9 @@ environment/bin/groundray info data/terrain/prairie_1m.tif
 environment/bin/groundray generate data/scenes/first_light.yaml -o out/first_light --quiet
 environment/bin/groundray-export out/first_light --to npz -o out/npz
 environment/bin/groundray-golden run -o out/golden | tail -n 3
+environment/bin/pip install --quiet --disable-pip-version-check "$(echo groundray-*.whl)[index]"
+environment/bin/groundray-index out -o out/index.parquet --report out/index.html
+environment/bin/python -c 'from groundray.index import Frames; print(len(Frames("out/index.parquet")), "frames")'
 if ldd environment/lib/python3*/site-packages/groundray/bin/groundray | grep 'not found'; then exit 1; fi
 environment/bin/pip install --quiet --disable-pip-version-check "$(echo groundray-*.whl)[cluster]"
 environment/bin/groundray-cluster run data/scenes/first_light.yaml --shards 2 --store "file://$PWD/out/store" --workers 2

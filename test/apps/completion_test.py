@@ -17,6 +17,7 @@ PROGRAMS = [
     "groundray-golden",
     "groundray-view",
     "groundray-export",
+    "groundray-index",
     "groundray-cluster",
 ]
 COMMANDS = {
@@ -101,6 +102,9 @@ printf '%s\\n' "${{COMPREPLY[@]}}"
         ("groundray-export --la", {"--labels"}),
         ("groundray-export sc", {"scene.yaml"}),
         ("groundray-export --columns ", set()),
+        ("groundray-index --sp", {"--split"}),
+        ("groundray-index sc", {"scene.yaml"}),
+        ("groundray-index --split ", set()),
         ("groundray-cluster s", {"sweep", "shard", "status"}),
         ("groundray-cluster --completion z", {"zsh"}),
         ("groundray-cluster run --sh", {"--shards"}),
@@ -170,6 +174,7 @@ def shown_by_zsh(folder, line, words):
         ("groundray-golden compare --png ", ["kitti_depth", "label"]),
         ("groundray-view --c", ["--colour-by", "--compare-with", "--completion"]),
         ("groundray-export --to ", ["kitti", "semantic-kitti", "mcap"]),
+        ("groundray-index --s", ["--split", "--seed", "--skip-pending"]),
         ("groundray-cluster s", ["sweep", "shard", "status", "Show how far a run is"]),
         ("groundray-cluster run --s", ["--shards", "--seed", "--store", "--scratch"]),
     ],

@@ -17,11 +17,14 @@ COMMANDS = {
     "groundray-golden": ["run", "accept", "compare", "passes", "conform"],
     "groundray-view": [],
     "groundray-export": [],
+    "groundray-index": [],
     "groundray-cluster": ["run", "sweep", "shard", "merge", "status", "verify"],
 }
 OTHERS = {"--array", "--cuda", "--hip", "--opencl"}  # Slurm's, and those of ./dev bench device
 # A command, up to where a shell or a sentence would end it.
-CALL = re.compile(r"(?<![\w/.-])(groundray(?:-golden|-view|-export|-cluster)?)(?= )([^|;&`#\n]*)")
+CALL = re.compile(
+    r"(?<![\w/.-])(groundray(?:-golden|-view|-export|-index|-cluster)?)(?= )([^|;&`#\n]*)"
+)
 
 
 @functools.cache

@@ -74,7 +74,7 @@ groundray.simplify("mesh.ply")
 
 
 def test_the_package_passes_mypy(tmp_path):
-    """Covers its Python files, including groundray-export and groundray-cluster."""
+    """Covers all of its Python files, those of the programs too."""
     foreign = (
         "OpenEXR",
         "cv2",
@@ -87,6 +87,7 @@ def test_the_package_passes_mypy(tmp_path):
         "pyoidn",
         "pyproj",
         "rosbags",
+        "torch",
     )  # some have types
     settings = STRICT + "".join(
         f"[mypy-{name}.*]\nignore_missing_imports = True\n" for name in foreign

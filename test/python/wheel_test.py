@@ -175,6 +175,8 @@ def test_the_installed_program_runs(installed):
         PYTHONPATH=str(installed),
     )
     assert module == reported
+    reported = run(installed / "bin/groundray-index", "--help", PYTHONPATH=str(installed))
+    assert reported.startswith("usage: groundray-index ")
 
 
 def test_a_script_runs_the_program_of_its_name_in_the_package(tmp_path):

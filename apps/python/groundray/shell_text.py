@@ -136,7 +136,9 @@ def _zsh_arguments(parser: argparse.ArgumentParser, how: str) -> str:
         value = f":{_zsh_text(_label(action))}:{_zsh_action(action)}" if _has_value(action) else ""
         text = _zsh_text(action.help or "")
         lines += [f"'{others}{name}[{text}]{value}'" for name in action.option_strings]
-    lines += [f"':{_label(action)}:{_zsh_action(action)}'" for action in _arguments(parser)]
+    for action in _arguments(parser):
+        any_number = "*" if action.nargs in ("*", "+") else ""
+        lines.append(f"'{any_number}:{_label(action)}:{_zsh_action(action)}'")
     return " \\\n    ".join([f"  _arguments {how}", *lines])
 
 
