@@ -76,8 +76,8 @@ std::string commands_of(const CommandText& program) {
 }
 
 std::string others_than(const std::string& program) {
-  static constexpr std::array<std::string_view, 4> programs{"groundray", "groundray-export",
-                                                            "groundray-golden", "groundray-view"};
+  static constexpr std::array<std::string_view, 5> programs{
+      "groundray", "groundray-export", "groundray-golden", "groundray-index", "groundray-view"};
   std::string text;
   for (const std::string_view each : programs) {
     if (each == program) continue;

@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 
 from groundray.cluster.store import FinalError, Store, sum_of
-from groundray.dataset import read_bytes
+from groundray.file_content import read_bytes
 
 RECORD, COMMON, SCENE = "run.json", "common.yaml", "scene.yaml"
 DATASET = "dataset/dataset.yaml"

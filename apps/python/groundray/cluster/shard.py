@@ -22,7 +22,8 @@ from pathlib import Path
 from groundray.cluster.identity import COMMON, Task, log_of, marker_of
 from groundray.cluster.listing import Listed, Listing, closed, difference
 from groundray.cluster.store import FinalError, Store, sum_of
-from groundray.dataset import Error, read_bytes
+from groundray.dataset import Error
+from groundray.file_content import read_bytes
 
 _LIBC = ctypes.CDLL(None)  # loaded before any fork
 _PR_SET_PDEATHSIG = 1

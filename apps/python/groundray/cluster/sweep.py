@@ -12,7 +12,8 @@ from typing import NamedTuple
 import yaml
 
 from groundray._core import Worlds
-from groundray.dataset import Error, read_bytes, read_text
+from groundray.dataset import Error
+from groundray.file_content import read_bytes, read_text
 
 _KEYS = ("scene", "shards", "vary", "runs", "worlds")
 

@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from groundray.dataset import Camera, Dataset, Error, Frame, Lidar, matrix_of, read_listed
+from groundray.dataset import Camera, Dataset, Error, Frame, Lidar, matrix_of
 from groundray.export.sensor_path import Floats
+from groundray.file_content import read_listed
 
 Rectangle = tuple[int, int, int, int]
 """Left, top, right and bottom pixel, all included."""

@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from groundray import _core
-from groundray.dataset import Camera, Dataset, Error, Frame, read_listed
+from groundray.dataset import Camera, Dataset, Error, Frame
 from groundray.export.images import read_channels
 from groundray.export.notes import Notes
+from groundray.file_content import read_listed
 
 SUFFIX = "_denoised_not_truth"
 """End of the names of all files, before the extension."""

@@ -14,8 +14,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from groundray.dataset import Camera, Dataset, Error, Frame, read_listed
+from groundray.dataset import Camera, Dataset, Error, Frame
 from groundray.export.sensor_path import Floats
+from groundray.file_content import read_listed
 
 _GREY, _COLOUR = 0, 2  # colour types of PNG
 

@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from groundray._core import data_folder
-from groundray.dataset import Error, read_yaml
+from groundray.dataset import Error
+from groundray.file_content import read_yaml
 
 
 @dataclass(frozen=True)

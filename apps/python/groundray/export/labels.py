@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from groundray.dataset import Dataset, Error, read_yaml
+from groundray.dataset import Dataset, Error
 from groundray.export.label_sets import LabelSet
+from groundray.file_content import read_yaml
 
 Numbers = NDArray[np.uint32]
 

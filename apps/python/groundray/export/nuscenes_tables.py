@@ -8,10 +8,11 @@ from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
 
-from groundray.dataset import Dataset, read_text
+from groundray.dataset import Dataset
 from groundray.export.categories import Category
 from groundray.export.json_tables import table_text
 from groundray.export.sensor_path import Floats, quaternion_wxyz
+from groundray.file_content import read_text
 
 Row = dict[str, Any]
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from groundray.dataset import Camera, Dataset, Error, Frame, Lidar, read_yaml
+from groundray.dataset import Camera, Dataset, Error, Frame, Lidar
 from groundray.export.images import (
     has_depths,
     has_pictures,
@@ -24,6 +24,7 @@ from groundray.export.notes import Notes
 from groundray.export.ros_layouts import rows_of
 from groundray.export.scan import FullScale, read_scan
 from groundray.export.sensor_path import Floats, SensorPath, quaternion_wxyz
+from groundray.file_content import read_yaml
 
 MAP, BODY = "map", "base_link"
 _MODELS = ("plumb_bob", "rational_polynomial", "equidistant")

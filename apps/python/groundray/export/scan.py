@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from groundray.dataset import Dataset, Error, Frame, Lidar, read_listed
+from groundray.dataset import Dataset, Error, Frame, Lidar
 from groundray.export.sensor_path import Floats, SensorPath
+from groundray.file_content import read_listed
 
 # Units and meanings of the columns that docs/reference/formats.md defines.
 UNITS = {

@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from groundray.dataset import Error, nanoseconds_of, read_text
+from groundray.dataset import Error, nanoseconds_of
+from groundray.file_content import read_text
 
 Floats = NDArray[np.float64]
 Times = NDArray[np.int64]

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from groundray.dataset import Camera, Dataset, Error, Frame, read_text
+from groundray.dataset import Camera, Dataset, Error, Frame
 from groundray.export.images import (
     has_depths,
     has_pictures,
@@ -17,6 +17,7 @@ from groundray.export.images import (
 )
 from groundray.export.notes import Notes
 from groundray.export.sensor_path import Floats, SensorPath, quaternion_wxyz
+from groundray.file_content import read_text
 
 _PngOf = Callable[[Frame], bytes]
 

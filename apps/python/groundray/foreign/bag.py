@@ -17,7 +17,8 @@ from urllib.parse import quote
 
 import yaml
 
-from groundray.dataset import Error, open_regular, read_text
+from groundray.dataset import Error
+from groundray.file_content import open_regular, read_text
 from groundray.foreign.module import need, run
 
 _MAGIC = b"\x89MCAP0\r\n"

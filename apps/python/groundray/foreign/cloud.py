@@ -17,7 +17,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from groundray.dataset import Error, open_regular
+from groundray.dataset import Error
+from groundray.file_content import open_regular
 from groundray.foreign.module import need, run
 
 _TYPE = "sensor_msgs/msg/PointCloud2"

@@ -9,7 +9,8 @@ import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from groundray.dataset import Error, available_bytes, open_regular
+from groundray.dataset import Error
+from groundray.file_content import available_bytes, open_regular
 
 DONE, FAILED, LACKING = 0, 3, 4
 """Exit codes, which apps/scan/python_module.cpp knows; Python itself exits with 1 and 2."""

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from groundray.dataset import Dataset, Error, load_yaml
+from groundray.dataset import Dataset, Error
+from groundray.file_content import load_yaml
 from groundray.index.splits import World
 
 
