@@ -7,18 +7,18 @@
 
 namespace groundray {
 
+/// Blocks between the joints and beds of rock, each set back by itself.
+struct BenchBlocks {
+  double length_m = 2;  ///< along the line
+  double height_m = 1;  ///< rounded so that a whole number of them makes a face
+};
+
 /// Benches of a bank: level steps between its faces, as in quarries, pits and road cuttings.
 struct Benches {
   double height_m = 5;     ///< of each face
   double width_m = 3;      ///< of each bench
   double roughness_m = 0;  ///< largest setback of a face from its place, which varies along it
-  /// Blocks between the joints and beds of rock, each set back by itself; without them, setbacks
-  /// vary smoothly.
-  struct Blocks {
-    double length_m = 2;  ///< along the line
-    double height_m = 1;  ///< rounded so that a whole number of them makes a face
-  };
-  std::optional<Blocks> blocks{};
+  std::optional<BenchBlocks> blocks{};  ///< without them, setbacks vary smoothly
 };
 
 /// Profile of the banks of a trail: the height by which cuttings rise and embankments fall beyond

@@ -73,7 +73,7 @@ std::uint64_t Trails::fingerprint() const noexcept {
                              std::bit_cast<double>(spec.variant.value)};
     add(hash_of(std::span<const double>(numbers)));
     if (const auto& benches = spec.benches) {
-      const auto blocks = benches->blocks.value_or(Benches::Blocks{0, 0});
+      const auto blocks = benches->blocks.value_or(BenchBlocks{0, 0});
       const std::array sizes_m{benches->height_m, benches->width_m, benches->roughness_m,
                                blocks.length_m, blocks.height_m};
       add(hash_of(std::span<const double>(sizes_m)));
