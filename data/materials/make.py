@@ -371,19 +371,18 @@ def make_water(library: Earthlib) -> None:
     count = len(k.values) // 4
     at_nm = [1000 * um for um in struct.unpack(f"<{count}f", k.wavelength_um)]
     extinction = struct.unpack(f"<{count}f", k.values)
-    wavelengths = [nm for nm in EARTHLIB_NM if nm <= 1100]
     bed = [statistics.fmean(column) for column in zip(*darkest_soils(library), strict=True)]
     seen = [
         reflectance
         * math.exp(-8e9 * math.pi / nm * interpolated(at_nm, extinction, nm) * WATER_DEPTH_M)
-        for nm, reflectance in zip(wavelengths, bed, strict=False)
+        for nm, reflectance in zip(EARTHLIB_NM, bed, strict=True)
     ]
     (HERE / "water.yaml").write_text(
         f"# Computed, not measured: {WATER_DEPTH_M} m of clear water above dark_soil, as of a "
         f"river or a pond. {HEADER}"
         "name: water\n"
         "spectrum:\n"
-        f"  wavelengths_nm: {flow(wavelengths, 0)}\n"
+        f"  wavelengths_nm: {flow(EARTHLIB_NM, 0)}\n"
         f"  reflectances: {flow(seen, 4)}\n"
         "coat:\n"
         "  refractive_index: 1.33\n"
