@@ -113,13 +113,15 @@ INEXACT = re.compile(
     r"|(?<![\w.:>])(pow|hypot|cbrt|log1p|expm1|exp2)\("
 )
 
-# The Python package reads files by file_content.py; exports write into a folder that they have made.
+# The Python package reads files by file_content.py; exports write into a folder that they made.
 PYTHON_CALLS = {
     r"\b(?<!\.)open\(|\.read_(text|bytes)\(|np\.(load|fromfile|memmap|loadtxt|genfromtxt)\(": (
         "file_content.py"
     ),
     r"\bshutil\.copy|\bcopyfile(obj)?\(|\bZipFile\(|\bTarFile\(": "",
-    r"\.open\(": "cluster/shard.py export/las.py export/mcap_file.py export/images.py file_content.py",
+    r"\.open\(": (
+        "cluster/shard.py export/las.py export/mcap_file.py export/images.py file_content.py"
+    ),
 }
 
 # The passes also run on devices, for which only these headers exist.
@@ -198,7 +200,8 @@ def faults_of(path: Path, used: set[tuple[str, str]]) -> list[str]:
 def faults_of_python(path: Path, package: Path) -> list[str]:
     text, name = path.read_text(), str(path.relative_to(package))
     return [
-        f"{path}:{text.count(chr(10), 0, call.start()) + 1}: {call[0]}: read files by file_content.py"
+        f"{path}:{text.count(chr(10), 0, call.start()) + 1}: {call[0]}: "
+        "read files by file_content.py"
         for pattern, places in PYTHON_CALLS.items()
         for call in re.finditer(pattern, text)
         if name not in places.split()
